@@ -14,6 +14,7 @@ from lambent.core.plain import Triple
 from lambent.materials import lobes
 from lambent.materials.document import BLACK, Material
 from lambent.materials.lobes import COS_MIN, NUMPY, Vector
+from lambent.materials.slope_curve import at_cosine, normalised
 
 ENERGY_TOLERANCE = 0.01  # excess over 1 attributed to rounding, quadrature and devices
 SELECTION_FLOOR = 0.02  # share of k: Fresnel can vanish at wo (r0 = 0, wo = n) but not at the half vector
@@ -43,10 +44,25 @@ def coupling(cos_i: Any, cos_o: Any, ops: Any = NUMPY) -> Any:
     return 21 / 20 * under_fresnel(cos_i, ops) * under_fresnel(cos_o, ops)
 
 
+def diffuse_share(cos_i: Any, cos_o: Any, material: Material, ops: Any = NUMPY) -> Any:
+    """Factor of kd/pi between two directions of one side; cosines in [0, 1]."""
+    if material.kd_curve is not None:
+        curve = normalised(material.kd_curve)
+        return at_cosine(cos_i, curve, ops) * at_cosine(cos_o, curve, ops)
+    return coupling(cos_i, cos_o, ops) if material.kd_coupled else 1.0
+
+
+def diffuse_seen(cos_o: Any, material: Material, ops: Any = NUMPY) -> Any:
+    """The mean of `diffuse_share` over cosine-weighted light: albedo of the diffuse reflection over kd."""
+    if material.kd_curve is not None:
+        return at_cosine(cos_o, normalised(material.kd_curve), ops)
+    return under_fresnel(cos_o, ops) if material.kd_coupled else 1 + 0 * cos_o
+
+
 def evaluate(wi: Vector, wo: Vector, material: Material, ops: Any = NUMPY) -> Vector:
     """f in 1/sr per RGB channel, without the cosine (3.6), for unit directions on any side of the sheet."""
     same, across = wi[2] * wo[2] > 0, wi[2] * wo[2] < 0
-    share = coupling(ops.abs(wi[2]), ops.abs(wo[2]), ops) if material.kd_coupled else 1.0
+    share = diffuse_share(ops.abs(wi[2]), ops.abs(wo[2]), material, ops)
     value = [
         ops.select(same, material.kd[c] / np.pi * share, 0.0) + ops.select(across, material.kt_d[c] / np.pi, 0.0)
         for c in range(3)
@@ -66,10 +82,10 @@ def selection(wo: Vector, material: Material, ops: Any = NUMPY) -> list[Any]:
     It depends on wo alone, which keeps the mixture's pdf exact, and is roughly proportional to the returned energy.
     """
     cos_o = ops.abs(wo[2])
-    seen = under_fresnel(cos_o, ops) if material.kd_coupled else 1 + 0 * cos_o
+    seen = diffuse_seen(cos_o, material, ops)
     weights: list[Any] = [_mean(material.kd) * seen, _mean(material.kt_d) + 0 * cos_o]
     for lobe in material.lobes:
-        f = lobes.fresnel(cos_o, _mean(lobe.r0), ops)
+        f = lobes.mean_reflectance(cos_o, lobe, ops)
         f = f if lobe.side == "reflection" else 1 - f
         weights.append(_mean(lobe.k) * ops.maximum(f, SELECTION_FLOOR))
     total = sum(weights[1:], weights[0])

@@ -18,7 +18,7 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Material
-from lambent.materials.lobes import COS_MIN, NUMPY, Vector
+from lambent.materials.lobes import COS_MIN, NUMPY, Vector, widths
 
 STRAIGHT = 0.005  # slope: half of the light stays within .4 degrees, little more than the sun's disc
 MOST_TERMS = 4
@@ -31,7 +31,7 @@ def clear_terms(material: Material) -> Floats | None:
     Also None if part of the transmitted light is scattered, because the two could not be separated.
     """
     lobes = [lobe for lobe in material.transmission_lobes if any(lobe.k)]
-    spread = any(material.kt_d) or any(max(lobe.mx, lobe.my) > STRAIGHT for lobe in lobes)
+    spread = any(material.kt_d) or any(max(widths(lobe)) > STRAIGHT for lobe in lobes)
     if spread or not 0 < len(lobes) <= MOST_TERMS:
         return None
     return np.array([[*(np.asarray(lobe.k) * (1 - np.asarray(lobe.r0))), 1 - 2 * lobe.alpha] for lobe in lobes])

@@ -17,11 +17,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from lambent.materials.document import Lobe
+from lambent.materials.document import LEAST_M, MOST_M, Distribution, Lobe
+from lambent.materials.slope_curve import NODES_RHO, at_cosine, half_density, log_density, quantile
 
 Vector = tuple[Any, Any, Any]  # components x, y, z: floats or arrays of one shape
 COS_MIN = 1e-4  # the lobe is 0 for directions closer to the horizon (the cosine power diverges there)
@@ -100,20 +102,72 @@ def fresnel(cos_d: Any, r0: Any, ops: Any = NUMPY) -> Any:
     return r0 + (1 - r0) * (m2 * m2 * m)
 
 
+def density_of_slopes(slope2: Any, lobe: Lobe, ops: Any = NUMPY) -> Any:
+    """D h_z^4 pi mx my at the squared slope radius, in units of (mx, my): 1 at the centre of Beckmann and GGX."""
+    if lobe.shape is not None:
+        return ops.exp(log_density(slope2, lobe.shape, ops))
+    if lobe.distribution == "ggx":
+        return 1 / ((1 + slope2) * (1 + slope2))
+    return ops.exp(-slope2)
+
+
+def slope_radius(mass: Any, lobe: Lobe, ops: Any = NUMPY) -> Any:
+    """The slope radius, in units of (mx, my), inside which `mass` in [0, 1) of the lobe lies (4.6)."""
+    if lobe.shape is not None:
+        return quantile(mass, lobe.shape, ops)
+    return ops.sqrt(mass / (1 - mass)) if lobe.distribution == "ggx" else ops.sqrt(-ops.log(1 - mass))
+
+
+def spread(lobe: Lobe) -> float:
+    """The radius of the half inside which most of a curve lobe's light lies, over Beckmann's; 1 for other lobes."""
+    return 1.0 if lobe.shape is None else _spread(lobe.shape)
+
+
+@lru_cache(maxsize=512)
+def _spread(shape: tuple[float, ...]) -> float:
+    return float(quantile(np.array(0.5), shape, NUMPY) / np.sqrt(np.log(2)))
+
+
+def widths(lobe: Lobe) -> tuple[float, float]:
+    """The slopes along t and b of a Beckmann lobe that is as wide."""
+    return lobe.mx * spread(lobe), lobe.my * spread(lobe)
+
+
+def widening(lobe: Lobe) -> float:
+    """Factor on a small lamp's squared extent, in slopes, that widens a lobe as convolution does: 2 for Beckmann.
+
+    A lobe counts as the Gaussian of its radius at half height: 1.67 times 2 for GGX.
+    """
+    radius2 = {"beckmann": np.log(2), "ggx": np.sqrt(2) - 1}.get(lobe.distribution) or half_density(lobe.shape or ())
+    return float(2 * np.log(2) / radius2)
+
+
+def with_distribution(lobe: Lobe, name: Distribution) -> Lobe:
+    """The lobe with another distribution; the half of it inside which most light lies keeps its radius.
+
+    A curve follows the lobe at its nodes.
+    """
+    if name == lobe.distribution:
+        return lobe
+    if name == "curve":
+        shape = tuple(np.asarray(density_of_slopes(NODES_RHO**2, lobe)).tolist())
+        return lobe.model_copy(update={"distribution": name, "shape": shape})
+    plain = lobe.model_copy(update={"distribution": name, "shape": None})
+    scale = float(slope_radius(np.array(0.5), lobe) / slope_radius(np.array(0.5), plain))
+    mx, my = (min(max(scale * m, LEAST_M), MOST_M) for m in (lobe.mx, lobe.my))
+    return plain.model_copy(update={"mx": mx, "my": my})
+
+
 def distribution(h: Vector, lobe: Lobe, ops: Any = NUMPY) -> Any:
-    """Microfacet density D(h), 1/sr: Beckmann (3.3) or anisotropic GGX."""
+    """Microfacet density D(h), 1/sr: Beckmann (3.3), anisotropic GGX, or a curve."""
     hz2 = ops.maximum(h[2] * h[2], 1e-12)
     slope2 = ((h[0] / lobe.mx) * (h[0] / lobe.mx) + (h[1] / lobe.my) * (h[1] / lobe.my)) / hz2
-    peak = 1 / (np.pi * lobe.mx * lobe.my * hz2 * hz2)
-    if lobe.distribution == "ggx":
-        return peak / ((1 + slope2) * (1 + slope2))
-    return peak * ops.exp(-slope2)
+    return density_of_slopes(slope2, lobe, ops) / (np.pi * lobe.mx * lobe.my * hz2 * hz2)
 
 
 def sample_half_vector(u1: Any, u2: Any, lobe: Lobe, ops: Any = NUMPY) -> Vector:
     """h with density D(h) h_z from u1, u2 in [0, 1): (4.5, 4.6) written in slopes, without quadrants."""
-    u1 = ops.minimum(u1, 1 - 1e-7)
-    r = ops.sqrt(u1 / (1 - u1)) if lobe.distribution == "ggx" else ops.sqrt(-ops.log(1 - u1))
+    r = slope_radius(ops.minimum(u1, 1 - 1e-7), lobe, ops)
     x = r * lobe.mx * ops.cos(2 * np.pi * u2)
     y = r * lobe.my * ops.sin(2 * np.pi * u2)
     scale = 1 / ops.sqrt(x * x + y * y + 1)
@@ -146,9 +200,23 @@ def shape(wi: Vector, wo: Vector, lobe: Lobe, ops: Any = NUMPY) -> tuple[Any, An
     return ops.select(valid, value, 0.0), cos_d
 
 
+def reflectance(cos_d: Any, lobe: Lobe, channel: int, ops: Any = NUMPY) -> Any:
+    """F of a channel: the lobe's curve, or Schlick's approximation; cos_d in [0, 1]."""
+    if lobe.fresnel is not None:
+        return at_cosine(cos_d, lobe.fresnel[channel], ops)
+    return fresnel(cos_d, lobe.r0[channel], ops)
+
+
+def mean_reflectance(cos_d: Any, lobe: Lobe, ops: Any = NUMPY) -> Any:
+    """`reflectance`, averaged over channels."""
+    if lobe.fresnel is None:
+        return fresnel(cos_d, sum(lobe.r0) / 3, ops)
+    return sum(reflectance(cos_d, lobe, c, ops) for c in range(3)) / 3
+
+
 def tint(cos_d: Any, lobe: Lobe, channel: int, ops: Any = NUMPY) -> Any:
     """k times Fresnel: F for reflection (3.4), 1 - F for transmission (3.5)."""
-    f = fresnel(cos_d, lobe.r0[channel], ops)
+    f = reflectance(cos_d, lobe, channel, ops)
     return lobe.k[channel] * (f if lobe.side == "reflection" else 1 - f)
 
 

@@ -17,6 +17,7 @@ const LAMBENT_REFLECTION: u32 = 0u;
 const LAMBENT_TRANSMISSION: u32 = 1u;
 const LAMBENT_BECKMANN: u32 = 0u;
 const LAMBENT_GGX: u32 = 1u;
+const LAMBENT_CURVE: u32 = 2u;
 
 // Written from LOBE_DTYPE of lambent.materials.shader_layout.
 struct LambentLobe {
@@ -26,8 +27,12 @@ struct LambentLobe {
     my: f32,            // slope roughness along b
     alpha: f32,         // exponent of the cosine product, 0..1
     side: u32,          // LAMBENT_REFLECTION or LAMBENT_TRANSMISSION
-    distribution: u32,  // LAMBENT_BECKMANN or LAMBENT_GGX
+    distribution: u32,  // LAMBENT_BECKMANN, LAMBENT_GGX or LAMBENT_CURVE
     retro: u32,         // 1: centred on the direction to the light
+    shape_row: u32,     // of a curve, first row of its shape in the table of lambent_row (scattering.wgsl)
+    fresnel_row: u32,   // likewise of its Fresnel reflectances; 0: Schlick's approximation
+    widening: f32,      // factor on a lamp's extent that widens the lobe as much (lamp_light.wgsl)
+    spread: f32,        // width over that of a Beckmann lobe of mx and my
 }
 
 // normalize(wi + wo); finite but meaningless for opposite directions.
@@ -50,18 +55,6 @@ fn lambent_under_fresnel(cosine: f32) -> f32 {
     return c * (1.0 + m * (1.0 + m * (1.0 + m * (1.0 + m))));
 }
 
-// Microfacet density D(h) in 1/sr: Beckmann (3.3) or anisotropic GGX.
-fn lambent_distribution(h: vec3f, lobe: LambentLobe) -> f32 {
-    let hz2 = max(h.z * h.z, 1e-12);
-    let slope = h.xy / vec2f(lobe.mx, lobe.my);
-    let slope2 = dot(slope, slope) / hz2;
-    let peak = 1.0 / (LAMBENT_PI * lobe.mx * lobe.my * hz2 * hz2);
-    if lobe.distribution == LAMBENT_GGX {
-        return peak / ((1.0 + slope2) * (1.0 + slope2));
-    }
-    return peak * exp(-slope2);
-}
-
 // The unit half vector of slopes along t and b.
 fn lambent_from_slopes(slope: vec2f) -> vec3f {
     return vec3f(slope, 1.0) * inverseSqrt(dot(slope, slope) + 1.0);
@@ -72,24 +65,6 @@ fn lambent_mirrored(w: vec3f, about: vec3f) -> vec3f {
     return 2.0 * dot(w, about) * about - w;
 }
 
-// h with density D(h) h.z from u in [0, 1)^2 (4.5, 4.6), in slopes.
-fn lambent_sample_half_vector(u: vec2f, lobe: LambentLobe) -> vec3f {
-    let u1 = min(u.x, 1.0 - 1e-7);
-    var r = sqrt(-log(1.0 - u1));
-    if lobe.distribution == LAMBENT_GGX {
-        r = sqrt(u1 / (1.0 - u1));
-    }
-    let phi = 2.0 * LAMBENT_PI * u.y;
-    let slope = r * vec2f(lobe.mx * cos(phi), lobe.my * sin(phi));
-    return lambent_from_slopes(slope);
-}
-
 fn lambent_cosine_power(wi: vec3f, wo: vec3f, lobe: LambentLobe) -> f32 {
     return pow(max(abs(wi.z * wo.z), 1e-12), lobe.alpha);
-}
-
-// k times Fresnel: F for reflection (3.4), 1 - F for transmission (3.5).
-fn lambent_tint(cos_d: f32, lobe: LambentLobe) -> vec3f {
-    let f = lambent_fresnel(cos_d, lobe.r0);
-    return lobe.k * select(f, 1.0 - f, lobe.side == LAMBENT_TRANSMISSION);
 }

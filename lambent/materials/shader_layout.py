@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.materials.document import Lobe
+from lambent.materials.lobes import spread, widening
 
 SIDES = {"reflection": 0, "transmission": 1}
-DISTRIBUTIONS = {"beckmann": 0, "ggx": 1}
+DISTRIBUTIONS = {"beckmann": 0, "ggx": 1, "curve": 2}
 _PLAIN = {
     "f32": ("f4", 4), "vec2f": ("2f4", 8), "vec3f": ("3f4", 16), "vec4f": ("4f4", 16),
     "u32": ("u4", 4), "vec2u": ("2u4", 8), "vec4u": ("4u4", 16),
@@ -51,7 +52,15 @@ def wgsl_dtype(kind: str, text: str) -> tuple[np.dtype[Any], int]:
 LOBE_DTYPE = wgsl_dtype("LambentLobe", lobe_shader())[0]
 
 
-def packed_lobes(lobes: Sequence[Lobe]) -> NDArray[Any]:
-    """Structured array (N,) of `LOBE_DTYPE`, ready for a storage buffer."""
-    rows = [(o.k, o.mx, o.r0, o.my, o.alpha, SIDES[o.side], DISTRIBUTIONS[o.distribution], o.retro) for o in lobes]
-    return np.array(rows, LOBE_DTYPE)
+def packed_lobes(lobes: Sequence[Lobe], rows: Sequence[tuple[int, int]] = ()) -> NDArray[Any]:
+    """Structured array (N,) of `LOBE_DTYPE`, ready for a storage buffer; `rows` of `slope_curve.curve_rows`."""
+    return np.array(
+        [
+            (
+                o.k, o.mx, o.r0, o.my, o.alpha, SIDES[o.side], DISTRIBUTIONS[o.distribution], o.retro,
+                *(max(row, 0) for row in of_lobe), widening(o), spread(o),
+            )
+            for o, of_lobe in zip(lobes, rows or [(0, 0)] * len(lobes), strict=True)
+        ],
+        LOBE_DTYPE,
+    )  # fmt: skip

@@ -22,6 +22,7 @@ from lambent.core.geometry.sequences import hammersley
 from lambent.core.light.colour import srgb_decode, srgb_encode
 from lambent.core.pictures.images import to_bytes
 from lambent.core.progress import Progress, silent
+from lambent.materials.lobes import widths
 from lambent.realtime.display.display import SmoothPass, TonemapPass
 from lambent.realtime.frame_state import LIGHT_MAP_NOISE, QMC_N, SHOW, FrameState, frame_data
 from lambent.realtime.gpu.layouts import Layouts
@@ -264,7 +265,7 @@ class Renderer:
             return []
         record, shown = self.scene.record, {**self.scene.record.materials, **state.materials}
         widest = {
-            o.name: max((max(lobe.mx, lobe.my) for lobe in shown[o.material].lobes if not lobe.retro), default=0.0)
+            o.name: max((max(widths(lobe)) for lobe in shown[o.material].lobes if not lobe.retro), default=0.0)
             for o in record.objects
         }
         wanted = [k for k, r in enumerate(record.reflectors) if any(part.object not in panes for part in r.parts)]

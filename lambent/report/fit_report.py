@@ -43,7 +43,7 @@ MEANINGS = (
     ("r0", "Fresnel reflectance at normal incidence", "1"),
     ("alpha", "exponent of the cosines: increase at grazing angles", "1"),
 )
-DISTRIBUTIONS = {"beckmann": "Beckmann", "ggx": "GGX"}
+DISTRIBUTIONS = {"beckmann": "Beckmann", "ggx": "GGX", "curve": "curve"}
 EYE_LIKE = ("cuberoot", "log")
 
 

@@ -30,6 +30,7 @@ from lambent.core.geometry.directions import basis
 from lambent.core.geometry.triangles import triangle_areas, triangle_normals
 from lambent.core.progress import Progress, silent, tracked
 from lambent.materials.document import Material
+from lambent.materials.lobes import widths
 from lambent.scenes.floor_plan import FloorPlan, Surroundings, floor_plan, may_have_walls, shared_cells
 from lambent.scenes.mesh import Mesh, batches_of, corners_of, vertices_at_corners
 from lambent.scenes.scene import ReflectorRule, Scene, SceneObject
@@ -144,7 +145,7 @@ def _with_walls(found: Sequence[Reflector], scene: Scene) -> list[Reflector]:
 def is_glossy(material: Material) -> bool:
     """Whether a lobe of the material reflects within the angle that a mirrored view covers."""
     lobes = (lobe for lobe in material.lobes if lobe.mirrors and max(lobe.k) > 0)
-    return any(math.sqrt(lobe.mx * lobe.my) <= ROUGHEST for lobe in lobes)
+    return any(math.sqrt(math.prod(widths(lobe))) <= ROUGHEST for lobe in lobes)
 
 
 def _ruling(rules: Iterable[ReflectorRule], name: str) -> bool | None:

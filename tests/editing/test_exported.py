@@ -16,7 +16,9 @@ from lambent.materials.document import Lobe, Material, Provenance, load_material
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.of_models import editable
+from lambent.materials.lobes import widths
 from lambent.materials.models import model_named
+from lambent.materials.slope_curve import NODES_RHO
 
 CAMERA = Camera("view", (0.0, 1.0, 3.0), (0.0, 0.0, 0.0))
 ROUND = Lobe(mx=0.15, my=0.15, k=(0.8, 0.7, 0.6), r0=0.3)
@@ -81,29 +83,63 @@ def test_two_tints_of_one_lobe_are_no_lobe() -> None:
     assert export(one, "it", lobes=1).fitted == ("specular", "grazing")
 
 
-def test_what_was_edited_is_fitted_and_the_rest_stays() -> None:
-    """The edit makes a lobe's highlight that of a rougher lobe, so that the fit is known."""
+KD_CURVE = (0.2, 0.9, 1.0, 1.1, 1.0, 1.0, 0.9, 1.2)
+
+
+def curve_lobe(**numbers: object) -> Lobe:
+    """A lobe with a tail and a ring, whose Fresnel reflectance is that of no glass."""
+    shape = (1 + NODES_RHO**2) ** -1.8 + 0.1 * np.exp(-(((NODES_RHO - 1.5) / 0.4) ** 2))
+    fresnel = ((0.9, 0.5, 0.3, 0.2, 0.2, 0.2, 0.3, 0.4), (1.0,) * 8, (0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1))
+    return Lobe(distribution="curve", shape=tuple(shape.tolist()), fresnel=fresnel, k=(0.5, 0.4, 0.3), **numbers)
+
+
+def test_what_was_edited_becomes_a_curve_lobe_and_the_rest_stays() -> None:
+    """The edit makes a lobe's highlight that of a rougher lobe."""
     material = Material(kd=(0.3, 0.2, 0.1), lobes=(BRUSHED, ROUND))
     rougher = of_material(Material(lobes=(ROUND.model_copy(update={"mx": 0.25, "my": 0.25}),))).curves["highlight"]
     one = session(material)
     one.draw("it", "lobe 2 highlight", rougher)
-    found = export(one, "it", lobes=1, distribution="beckmann")
-    assert found.fitted == ("lobe 2 specular",)
-    assert found.material.lobes[0] == BRUSHED
-    assert found.material.lobes[1].mx == pytest.approx(0.25, rel=0.02)
-    assert np.allclose(found.material.kd, material.kd, atol=0.005)
-    assert found.verdict.word == "faithful"
+    found = export(one, "it")
+    assert found.fitted == () and found.material.lobes[0] == BRUSHED
+    assert (found.material.lobes[1].distribution, widths(found.material.lobes[1])[0]) == (
+        "curve",
+        pytest.approx(0.25, rel=0.02),
+    )
+    assert found.material.kd == material.kd and found.verdict.word == "faithful"
     assert close_to(one, found.material, 0.05)
 
 
-def test_what_no_lobe_can_follow_is_said() -> None:
-    """A ring about the highlight."""
+def test_a_curve_lobe_is_opened_and_closed_without_a_fit() -> None:
+    """Pulling a curve at the nodes of the document changes these alone; the document that was not edited stays."""
+    material = Material(
+        kd=0.2, kd_curve=KD_CURVE, lobes=(curve_lobe(mx=0.2, my=0.1), curve_lobe(mx=0.3, my=0.3, side="transmission"))
+    )
+    one = session(material)
+    same = export(one, "it")
+    assert same.fitted == () and same.material.model_copy(update={"name": "material", "provenance": None}) == material
+    for name, by in (("lobe 1 highlight", 1.5), ("lobe 2 fresnel", 0.7), ("diffuse", 1.2)):
+        values = one.editable("it").curves[name].values
+        angle = np.linspace(0, 1, len(values))[:, None]
+        one.draw("it", name, Curve(values * (1 + (by - 1) * angle)))
+    found = export(one, "it")
+    assert found.fitted == () and found.verdict.word == "faithful" and found.shares["l1"] < 0.01
+    again = session(found.material)
+    assert export(again, "it").material.lobes == found.material.lobes
+
+
+def test_a_ring_about_the_highlight_is_a_curve_lobe() -> None:
     one = session(Material(lobes=(ROUND,)))
-    ring = Region(a=0.5, b=0.55, c=0.6, d=0.65)
-    one.pull("it", "highlight", ring, y=60.0)
+    one.pull("it", "highlight", Region(a=0.4, b=0.55, c=0.7, d=0.85), y=20.0)
+    found = export(one, "it")
+    assert found.fitted == () and found.verdict.word == "approximate"
+
+
+def test_what_no_lobe_can_follow_is_said() -> None:
+    """A ring about a brushed highlight along one slope alone."""
+    one = session(Material(lobes=(BRUSHED,)))
+    one.pull("it", "highlight along", Region(a=0.5, b=0.55, c=0.6, d=0.65), y=60.0)
     found = export(one, "it", lobes=1)
-    assert found.verdict.word != "faithful"
-    assert found.shares["l1"] > 0.1
+    assert found.fitted and found.verdict.word != "faithful"
 
 
 def test_models_without_a_document_are_fitted() -> None:

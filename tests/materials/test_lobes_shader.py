@@ -21,10 +21,39 @@ from lambent.core.geometry.directions import normalize
 from lambent.materials import lobes
 from lambent.materials.bsdf import MaterialBSDF, components, under_fresnel
 from lambent.materials.clear import MOST, MOST_TERMS, STRAIGHT, clear_terms, transmittance
-from lambent.materials.document import Lobe, Material
+from lambent.materials.document import COSINE_NODES, Lobe, Material
 from lambent.materials.shader_layout import LOBE_DTYPE, packed_lobes
+from lambent.materials.slope_curve import NODES_RHO, curve_rows
 from lambent.realtime.gpu.shader_source import assemble
 from tests.tools.shader_parity import assert_parity, run_wgsl
+
+STRUCT = Path(lobes.__file__).with_suffix(".wgsl").read_text(encoding="utf-8")
+SHADER = assemble("lobes.wgsl", "scattering.wgsl", "lamp_light.wgsl").replace(
+    "override LAMBENT_CURVES: bool = false", "const LAMBENT_CURVES = true"
+)
+RHO2 = NODES_RHO**2
+TWO_WIDTHS = tuple((0.7 * np.exp(-np.minimum(2 * RHO2, 700)) + 0.3 * (1 + RHO2) ** -1.6).tolist())
+RING = tuple(np.exp(-(((np.sqrt(RHO2) - 1) / 0.4) ** 2).clip(0, 60)).tolist())
+ENDS = ((1, 0.9, 1), (1, 0.5, 2), (0.9, 0.0, 3))
+FRESNEL = tuple(tuple((np.linspace(high, low, COSINE_NODES) ** power).tolist()) for high, low, power in ENDS)
+
+
+def declared(lobe: Lobe, rows: tuple[int, int] = (0, 0)) -> str:
+    """The constant LOBE of a shader; the lobe's curves are in the table of `lambent_row` from `rows` on."""
+    k, r0 = (f"vec3f({','.join(map(str, v))})" for v in (lobe.k, lobe.r0))
+    row = packed_lobes([lobe], [rows])[0]
+    numbers = ", ".join(f"{row[name]}u" for name in ("side", "distribution", "retro", "shape_row", "fresnel_row"))
+    rest = f"{numbers}, {row['widening']}, {row['spread']}"
+    return f"const LOBE = LambentLobe({k}, {lobe.mx}, {r0}, {lobe.my}, {lobe.alpha}, {rest});"
+
+
+def run(call: str, lobe: Lobe, inputs: dict[str, np.ndarray], components: int = 1) -> np.ndarray:
+    """Value of a WGSL expression with LOBE for every row of the inputs."""
+    curves, ((shape, fresnel),), _ = curve_rows(Material(lobes=(lobe,)))
+    declarations = declared(lobe, (shape + 1, fresnel + 1)) + "fn lambent_row(i: u32) -> vec4f { return rows[i]; }"
+    tables = {"rows": np.concatenate([np.zeros((1, 4)), curves])}
+    return run_wgsl(SHADER, call, inputs, components=components, declarations=declarations, tables=tables)
+
 
 SHEET = Lobe(side="transmission", mx=0.003, my=0.003, r0=0.04, k=(0.9, 0.5, 0.2), alpha=0.52, distribution="ggx")
 MIRRORED = Lobe(mx=0.003, my=0.003, r0=0.08)
@@ -87,10 +116,11 @@ LIT = {
     "rough": Lobe(mx=0.4, my=0.4, r0=0.7, alpha=0.5),
     "brushed": Lobe(mx=0.3, my=0.1, r0=0.8, alpha=0.5),
     "ggx": Lobe(mx=0.2, my=0.15, r0=0.5, distribution="ggx"),
+    "two widths": Lobe(mx=0.2, my=0.15, fresnel=FRESNEL, distribution="curve", shape=TWO_WIDTHS),
     "transmission": Lobe(mx=0.2, my=0.2, r0=0.1, k=(0.8, 0.7, 0.6), side="transmission"),
     "retro": Lobe(mx=0.15, my=0.2, r0=1.0, k=0.7, retro=True, alpha=-1.5),
 }
-TOLERANCE = {"ggx": 0.04}  # of the largest value; a lobe without a variance is widened by a fit
+TOLERANCE = {"ggx": 0.04, "two widths": 0.04}  # of the largest value; a lobe without a variance is widened by a fit
 
 
 def disc(w: np.ndarray, a: np.ndarray, b: np.ndarray, steps: int = 41) -> np.ndarray:
@@ -114,9 +144,8 @@ def response(lobe: Lobe, wo: np.ndarray, w: np.ndarray, axes: np.ndarray) -> np.
     """What the shader says of lamps at w (N, 3) with deviations (N, 2, 3), in the frame of the mirror direction."""
     turned = np.array([-1, -1, 1] if lobe.retro else [1, 1, 1]) * ([1, 1, -1] if lobe.side == "transmission" else 1)
     w, axes = np.broadcast_to(w * turned, wo.shape), np.broadcast_to(axes * turned, (len(wo), 2, 3))
-    source, inputs = assemble("lobes.wgsl", "lamp_light.wgsl"), {"wo": wo, "wi": w, "a": axes[:, 0], "b": axes[:, 1]}
-    call = "lambent_lamp_response(LOBE, wo, wi, a, b)"
-    return run_wgsl(source, call, inputs, components=3, declarations=declared(lobe))
+    inputs = {"wo": wo, "wi": w, "a": axes[:, 0], "b": axes[:, 1]}
+    return run("lambent_lamp_response(LOBE, wo, wi, a, b)", lobe, inputs, 3)
 
 
 @pytest.mark.parametrize("name", LIT)
@@ -160,7 +189,6 @@ def test_a_lamp_without_size_shows_the_lobe(name: str) -> None:
     assert_parity(got, expected.astype(np.float32), rtol=2e-3, atol=1e-4 * float(expected.max()))
 
 
-SHADER = Path(lobes.__file__).with_suffix(".wgsl").read_text(encoding="utf-8")
 COUNT = 5000
 LOBES = [
     Lobe(side=side, distribution=distribution, k=(0.9, 0.5, 0.2), r0=(0.9, 0.5, 0.03), mx=mx, my=my, alpha=alpha)
@@ -168,6 +196,13 @@ LOBES = [
     for distribution in ("beckmann", "ggx")
     for mx, my, alpha in ((0.3, 0.3, 0.0), (0.11, 0.5, 0.43), (1.4, 0.8, 1.0))
 ]
+LOBES += [
+    Lobe(side=side, distribution="curve", shape=shape, fresnel=fresnel, k=(0.9, 0.5, 0.2), mx=mx, my=my, alpha=0.3)
+    for side, shape, fresnel, mx, my in (
+        ("reflection", TWO_WIDTHS, FRESNEL, 0.3, 0.3), ("transmission", TWO_WIDTHS, FRESNEL, 0.11, 0.5),
+        ("reflection", RING, None, 0.2, 0.2),
+    )
+]  # fmt: skip
 LOBES += [
     Lobe(retro=True, distribution=distribution, k=(0.9, 0.5, 0.2), r0=(0.9, 0.5, 0.03), mx=0.11, my=0.2, alpha=alpha)
     for distribution, alpha in (("beckmann", -4.0), ("ggx", 0.5))
@@ -178,24 +213,15 @@ def name_of(lobe: Lobe) -> str:
     return f"{'retro' if lobe.retro else lobe.side}-{lobe.distribution}-{lobe.mx}-{lobe.my}-{lobe.alpha}"
 
 
-def declared(lobe: Lobe) -> str:
-    k, r0 = (f"vec3f({','.join(map(str, v))})" for v in (lobe.k, lobe.r0))
-    row = packed_lobes([lobe])[0]
-    return (
-        f"const LOBE = LambentLobe({k}, {lobe.mx}, {r0}, {lobe.my}, {lobe.alpha}, "
-        f"{row['side']}u, {row['distribution']}u, {row['retro']}u);"
-    )
-
-
 @pytest.mark.parametrize("lobe", LOBES, ids=name_of)
 def test_distribution_and_sampled_half_vectors(lobe):
     u = np.random.default_rng(0).uniform(0.001, 0.999, (COUNT, 2)).astype(np.float32)  # near 0, log(1 - u) is absolute
     h = np.stack(lobes.sample_half_vector(*u.T.astype(float), lobe), axis=-1)
-    got = run_wgsl(SHADER, "lambent_sample_half_vector(u, LOBE)", {"u": u}, components=3, declarations=declared(lobe))
+    got = run("lambent_sample_half_vector(u, LOBE)", lobe, {"u": u}, 3)
     assert_parity(got, h, rtol=1e-5, atol=1e-5)
     h = h.astype(np.float32)
     expected = lobes.distribution(components(h), lobe)
-    got = run_wgsl(SHADER, "lambent_distribution(h, LOBE)", {"h": h}, declarations=declared(lobe))
+    got = run("lambent_distribution(h, LOBE)", lobe, {"h": h})
     assert_parity(got, expected, rtol=1e-5, atol=1e-6 * expected.max())
 
 
@@ -205,7 +231,7 @@ def test_tint_and_cosines(lobe):
     i, o = cosine.T.astype(float)
     expected = np.stack([lobes.tint(i, lobe, c) for c in range(3)], axis=-1) * ((i * o) ** lobe.alpha)[:, None]
     call = "lambent_tint(c.x, LOBE) * lambent_cosine_power(vec3f(0., 0., c.x), vec3f(0., 0., c.y), LOBE)"
-    got = run_wgsl(SHADER, call, {"c": cosine}, components=3, declarations=declared(lobe))
+    got = run(call, lobe, {"c": cosine}, 3)
     assert_parity(got, expected, rtol=1e-5, atol=1e-6 * expected.max())
 
 
@@ -214,7 +240,7 @@ def test_distribution_of_narrow_lobes(distribution):
     lobe = Lobe(mx=0.0068, my=0.0297, distribution=distribution)
     u = np.random.default_rng(3).random((COUNT, 2))
     h = np.stack(lobes.sample_half_vector(*u.T, lobe), axis=-1).astype(np.float32)
-    got = run_wgsl(SHADER, "lambent_distribution(h, LOBE)", {"h": h}, declarations=declared(lobe))
+    got = run("lambent_distribution(h, LOBE)", lobe, {"h": h})
     assert_parity(got, lobes.distribution(components(h), lobe), rtol=1e-5)
 
 
@@ -222,24 +248,24 @@ def test_fresnel():
     cosine = np.linspace(0, 1, COUNT, dtype=np.float32)
     expected = np.stack([lobes.fresnel(cosine.astype(float), r0) for r0 in (0.03, 0.5, 1.0)], axis=-1)
     call = "lambent_fresnel(cosine, vec3f(.03, .5, 1.))"
-    assert_parity(run_wgsl(SHADER, call, {"cosine": cosine}, components=3), expected, rtol=1e-5)
+    assert_parity(run_wgsl(STRUCT, call, {"cosine": cosine}, components=3), expected, rtol=1e-5)
 
 
 def test_under_fresnel():
     cosine = np.geomspace(1e-4, 1, COUNT, dtype=np.float32)
-    got = run_wgsl(SHADER, "lambent_under_fresnel(cosine)", {"cosine": cosine})
+    got = run_wgsl(STRUCT, "lambent_under_fresnel(cosine)", {"cosine": cosine})
     assert_parity(got, under_fresnel(cosine.astype(float)), rtol=1e-5)
 
 
 def test_layout_is_the_shaders():
     """Name and offset of every field, by WGSL's rules of alignment."""
-    body = re.search(r"struct LambentLobe \{(.*?)\}", SHADER, re.DOTALL)[1]
+    body = re.search(r"struct LambentLobe \{(.*?)\}", STRUCT, re.DOTALL)[1]
     align, size = {"f32": 4, "u32": 4, "vec3f": 16}, {"f32": 4, "u32": 4, "vec3f": 12}
     offsets, end = {}, 0
     for name, kind in re.findall(r"^\s*(\w+): (\w+),", body, re.MULTILINE):
         offsets[name] = -(-end // align[kind]) * align[kind]
         end = offsets[name] + size[kind]
     assert {name: offset for name, (_, offset, *_) in LOBE_DTYPE.fields.items()} == offsets
-    assert LOBE_DTYPE.itemsize == -(-end // 16) * 16 == 48
+    assert LOBE_DTYPE.itemsize == -(-end // 16) * 16 == 64
     row = packed_lobes([Lobe(side="transmission", distribution="ggx", mx=0.1, my=0.2, k=0.5)])[0]
     assert (row["side"], row["distribution"]) == (1, 1) and row["k"].tolist() == [0.5] * 3

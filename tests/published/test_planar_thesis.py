@@ -10,7 +10,6 @@ import pytest
 
 from lambent.materials.document import Lobe
 from lambent.published.planar_thesis import multi_ring_table, offered
-from lambent.realtime.integrators.patterns import radius
 from lambent.realtime.light.baked import Probe
 from lambent.realtime.planar.planar_integrators import PLANAR
 from lambent.realtime.renderer import Renderer
@@ -44,4 +43,4 @@ def test_multi_rings_of_ten_are_three_of_three() -> None:
     r = np.hypot(rows[:, 0], rows[:, 1]) / 0.1
     assert sorted({round(float(x), 3) for x in r}) == pytest.approx([0, *sorted(set(r.round(3)))[1:]])
     assert [int((np.abs(r - x) < 1e-3).sum()) for x in np.unique(r.round(3))] == [1, 3, 3, 3]
-    assert r.max() < radius(0.99)
+    assert r.max() < np.sqrt(-np.log(0.01))

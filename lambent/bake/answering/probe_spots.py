@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.bake.bsdfs.diffuse_shares import DiffuseShares
 from lambent.bake.bsdfs.material_plugin import DIFFUSE_ATTRIBUTE
 from lambent.bake.tracing import rays
 from lambent.bake.tracing.lights.sun import SunRays
@@ -20,7 +21,6 @@ from lambent.baked.answering.stored import NO_SPOT
 from lambent.core.arrays import Floats
 from lambent.core.geometry.cubemap import face_directions
 from lambent.core.geometry.directions import normalize
-from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Material
 
 MOST_OWN = 64  # surfaces of its own object that a ray of a probe passes
@@ -35,7 +35,7 @@ class ProbeEyes:
         self._size = traced.texels.width, traced.texels.height
         looks = dict(builder.scene.materials) | dict.fromkeys(builder.measured, Material())
         self._names = [o.name for o in builder.scene.objects]
-        self._coupled = mi.Bool(np.array([looks[o.material].kd_coupled for o in builder.scene.objects], bool))
+        self._shares = DiffuseShares([looks[o.material] for o in builder.scene.objects])
         self._textured = any(t.diffuse for t in builder.scene.textures.values())
         self._sun = None if traced.sun is None else SunRays(traced.sun, self._whole)
         self._sun_y = 1.0 if traced.sun is None else float(mi.luminance(mi.Color3f(*traced.sun.record.irradiance))[0])
@@ -54,8 +54,7 @@ class ProbeEyes:
         cosine = mi.Frame3f.cos_theta(si.wi)
         texel = light_map_texel(si, *self._size, met) * 2 + dr.select(cosine < 0, mi.UInt32(1), mi.UInt32(0))
         number = self._numbers.at(si, met)
-        shown = dr.select(dr.gather(mi.Bool, self._coupled, number, met), under_fresnel(dr.abs(cosine), dr), 1.0)
-        tint = mi.Color3f(1.0) * shown
+        tint = mi.Color3f(1.0) * self._shares.seen(number, dr.abs(cosine), met)
         if self._textured:
             tint *= mi.Color3f(si.bsdf().eval_attribute_3(DIFFUSE_ATTRIBUTE, si, met))
         sun: Any = mi.Color3f(0.0) if self._sun is None else self._sun(si, met)

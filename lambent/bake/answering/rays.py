@@ -14,6 +14,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.bake.bsdfs.diffuse_shares import DiffuseShares
 from lambent.bake.bsdfs.material_plugin import DIFFUSE_ATTRIBUTE
 from lambent.bake.light.sampling import points_of
 from lambent.bake.surfaces.texels import POINTS, Sides
@@ -24,7 +25,6 @@ from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats, Indices
 from lambent.core.geometry.sequences import hammersley
 from lambent.core.light.colour import luminance
-from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Material
 
 NOWHERE = 0xFFFFFFFF  # of rays that leave the scene
@@ -45,7 +45,7 @@ class RayEnds:
         materials = [looks[o.material] for o in builder.scene.objects]
         diffuse = np.array([float(luminance(np.array(m.kd)) + luminance(np.array(m.kt_d))) for m in materials])
         self._diffuse = mi.Float(np.maximum(diffuse, LEAST_DIFFUSE).astype(np.float32))
-        self._coupled = mi.Bool(np.array([m.kd_coupled for m in materials], bool))
+        self._shares = DiffuseShares(materials)
         self._textured = any(t.diffuse for t in builder.scene.textures.values())
 
     def from_texels(self, sides: Sides, mine: Indices, count: int, seed: int) -> tuple[NDArray[np.uint32], Floats]:
@@ -77,7 +77,7 @@ class RayEnds:
         ray = self._leaving(sides, mine, count, rng)
         sampler = independent(int(rng.integers(1 << 32)), n * count)
         spot, weight = _followed(
-            self._whole, sampler, mi.Ray3f(ray), self._numbers, self._diffuse, self._coupled, self._size,
+            self._whole, sampler, mi.Ray3f(ray), self._numbers, self._diffuse, self._shares, self._size,
             self._textured, rays.has_holes(self._whole),
         )  # fmt: skip
         weight = dr.select(dr.isfinite(weight), weight, 0.0)
@@ -102,7 +102,7 @@ class RayEnds:
 
 
 @dr.syntax
-def _followed(scene, sampler, ray, numbers, diffuse, coupled, size, textured, holes):  # type: ignore[no-untyped-def]
+def _followed(scene, sampler, ray, numbers, diffuse, shares, size, textured, holes):  # type: ignore[no-untyped-def]
     width = dr.width(ray.o)
     spot = dr.full(mi.UInt32, NOWHERE, width)
     weight, throughput = dr.zeros(mi.Float, width), dr.ones(mi.Float, width)
@@ -119,7 +119,7 @@ def _followed(scene, sampler, ray, numbers, diffuse, coupled, size, textured, ho
         ending = dr.gather(mi.Float, diffuse, number, active)
         goes_on = active & (sampler.next_1d(active) * (sent + ending) < sent)
         ends = active & ~goes_on
-        shown = dr.select(dr.gather(mi.Bool, coupled, number, active), under_fresnel(dr.abs(cosine), dr), 1.0)
+        shown = shares.seen(number, dr.abs(cosine), active)
         if textured:
             shown *= mi.luminance(mi.Color3f(bsdf.eval_attribute_3(DIFFUSE_ATTRIBUTE, si, active)))
         texel = light_map_texel(si, size[0], size[1], active) * 2 + dr.select(cosine < 0, mi.UInt32(1), mi.UInt32(0))

@@ -27,6 +27,7 @@ import mitsuba as mi
 
 from lambent.bake.bsdfs.textured import SurfaceTextures, faced_side, facing_frame, textures_dict
 from lambent.bake.engine import once_per_variant
+from lambent.bake.tracing.array_ops import array_ops
 from lambent.materials import bsdf
 from lambent.materials.clear import MOST, clear_terms, transmittance
 from lambent.materials.document import BLACK, Material, material_from
@@ -71,6 +72,7 @@ def register_material_plugin() -> type:
             mi.BSDF.__init__(self, props)
             self.material = material_from(json.loads(str(props["material"])), f"{PLUGIN} {props.id()}")
             self._on_device = on_device(self.material)
+            self._ops = array_ops()
             self.textures = SurfaceTextures(props)
             self.anisotropic = any(lobe.mx != lobe.my for lobe in self.material.lobes)
             self.framed = "normal" in self.textures or (self.anisotropic and "direction" in self.textures)
@@ -91,12 +93,12 @@ def register_material_plugin() -> type:
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> Any:
             material, frame = self._enabled(ctx, si, active), self._frame(si, active)
             wo = frame.to_local(si.wi)
-            wi = bsdf.sample(wo, sample1, sample2.x, sample2.y, material, dr)
-            density = bsdf.pdf(wi, wo, material, dr)
+            wi = bsdf.sample(wo, sample1, sample2.x, sample2.y, material, self._ops)
+            density = bsdf.pdf(wi, wo, material, self._ops)
             bs = mi.BSDFSample3f()
             bs.wo = mi.Vector3f(frame.to_world(mi.Vector3f(*wi)))
             active &= (density > 0) & self._is_possible(si, bs.wo, wi)
-            value = mi.Color3f(bsdf.evaluate(wi, wo, material, dr))
+            value = mi.Color3f(bsdf.evaluate(wi, wo, material, self._ops))
 
             bs.pdf = dr.select(active, density, 0.0)
             bs.eta = 1.0
@@ -112,13 +114,13 @@ def register_material_plugin() -> type:
         def eval_pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             material, frame = self._enabled(ctx, si, active), self._frame(si, active)
             viewer, light = frame.to_local(si.wi), frame.to_local(wo)
-            value = mi.Color3f(bsdf.evaluate(light, viewer, material, dr)) * dr.abs(light[2])
-            density = bsdf.pdf(light, viewer, material, dr)
+            value = mi.Color3f(bsdf.evaluate(light, viewer, material, self._ops)) * dr.abs(light[2])
+            density = bsdf.pdf(light, viewer, material, self._ops)
             active &= self._is_possible(si, wo, light)
             return dr.select(active, value, 0.0), dr.select(active, density, 0.0)
 
         def eval_diffuse_reflectance(self, si: Any, active: Any = True) -> Any:
-            seen = bsdf.under_fresnel(dr.abs(si.wi.z), dr) if self.material.kd_coupled else 1.0
+            seen = bsdf.diffuse_seen(dr.abs(si.wi.z), self.material, self._ops)
             kd = mi.Color3f(self.material.kd) * self.textures.diffuse(si, active)
             return dr.select(active, kd * seen, 0.0)
 
@@ -170,7 +172,7 @@ def register_material_plugin() -> type:
             """Index and flags of the component that `bsdf.sample` chose."""
             index, flags = mi.UInt32(0), mi.UInt32(self.m_components[0])
             up_to = mi.Float(0)
-            for i, share in enumerate(bsdf.selection(wo, material, dr)):
+            for i, share in enumerate(bsdf.selection(wo, material, self._ops)):
                 here = sample1 >= up_to
                 index = dr.select(here, mi.UInt32(i), index)
                 flags = dr.select(here, mi.UInt32(self.m_components[i]), flags)

@@ -9,20 +9,20 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from lambent.bake.bsdfs.diffuse_shares import DiffuseShares
 from lambent.bake.bsdfs.material_plugin import DIFFUSE_ATTRIBUTE
 from lambent.bake.tracing.lights.lamps import LampRays
 from lambent.bake.tracing.lights.sun import SunRays
 from lambent.bake.tracing.path_tracer import Points
 from lambent.bake.tracing.scene_builder import SceneBuilder, light_map_uv
 from lambent.core.arrays import Floats
-from lambent.materials.bsdf import under_fresnel
 from lambent.materials.document import Material
 
 
 class LightMapCache:
     """Diffuse radiance of surfaces from baked irradiance: kd/pi E of this side plus kt_d/pi E of the other.
 
-    A coupled kd falls with the viewer's cosine, t(cos_o); its mean over the light's cosines is used, which is exact for
+    Where kd depends on directions (`DiffuseShares`), its mean over the light's cosines is used, which is exact for
     uniform light. Shadow rays add the `sun` and the `lamps` that the light map leaves out. By side, `drawn` is the part
     (H, W, 3) of its light that renderers draw by pixel.
     """
@@ -37,7 +37,7 @@ class LightMapCache:
         materials = [Material() if o.name in builder.unmapped else looks[o.material] for o in builder.scene.objects]
         self._numbers = builder.numbers
         self._reflected = mi.Color3f(np.array([m.kd for m in materials], np.float32).T / np.float32(np.pi))
-        self._coupled = mi.Bool(np.array([m.kd_coupled for m in materials], bool))
+        self.shares = DiffuseShares(materials)
         self._transmitted = mi.Color3f(np.array([m.kt_d for m in materials], np.float32).T / np.float32(np.pi))
         self._textured = any(t.diffuse for t in builder.scene.textures.values())
         self._front = _texture(irradiance)
@@ -58,21 +58,20 @@ class LightMapCache:
     def _shown(self, si: Any, active: Any, irradiance: list[tuple[Any, Any]]) -> list[Any]:
         """Diffuse radiance (mi.Color3f) of surfaces for each pair of irradiances on the normal's side and the other."""
         outside = mi.Frame3f.cos_theta(si.wi) > 0
-        reflected, transmitted, coupled = self.colours(si, active)
-        reflected *= dr.select(coupled, under_fresnel(dr.abs(mi.Frame3f.cos_theta(si.wi)), dr), 1.0)
+        reflected, transmitted, number = self.colours(si, active)
+        reflected *= self.shares.seen(number, dr.abs(mi.Frame3f.cos_theta(si.wi)), active)
         by_front, by_back = dr.select(outside, reflected, transmitted), dr.select(outside, transmitted, reflected)
         return [by_front * front + by_back * back for front, back in irradiance]
 
     def colours(self, si: Any, active: Any) -> tuple[Any, Any, Any]:
-        """kd/pi, kt_d/pi (mi.Color3f), textured, and whether kd is coupled (mi.Bool)."""
+        """kd/pi, kt_d/pi (mi.Color3f), textured, and the number of the material in `shares`."""
         number = self._numbers.at(si, active)
         reflected = dr.gather(mi.Color3f, self._reflected, number, active)
         transmitted = dr.gather(mi.Color3f, self._transmitted, number, active)
-        coupled = dr.gather(mi.Bool, self._coupled, number, active)
         if self._textured:
             texture = si.bsdf().eval_attribute_3(DIFFUSE_ATTRIBUTE, si, active)
             reflected, transmitted = reflected * texture, transmitted * texture
-        return reflected, transmitted, coupled
+        return reflected, transmitted, number
 
     def sun_on(self, points: Points, active: Any) -> list[tuple[Any, Any]]:
         """Irradiance (mi.Color3f) of the sun that the light map leaves out, and the direction it comes from."""

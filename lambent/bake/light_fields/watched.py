@@ -7,6 +7,7 @@ look-ups confuse, and diffuse light hides it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import drjit as dr
@@ -21,7 +22,7 @@ from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.triangles import triangle_areas
 from lambent.core.light.colour import luminance
 from lambent.materials.document import Lobe, Material
-from lambent.materials.lobes import fresnel
+from lambent.materials.lobes import tint, widths
 from lambent.scenes.scene import Mesh
 
 POINTS, SPREAD, LEAST = 768, 8, 32  # points, directions of each side, points in view below which nothing is known
@@ -108,19 +109,18 @@ def _rays_of_lobes(material: Material, view: Floats, n: Floats, rng: np.random.G
         lobes = [one for one in material.lobes if (one.side == "transmission") == through and not one.retro]
         if not lobes:
             continue
-        w = spread_mirrored(view, n, max((one.mx * one.my) ** 0.5 for one in lobes), SPREAD, rng)
+        w = spread_mirrored(view, n, max(math.prod(widths(one)) ** 0.5 for one in lobes), SPREAD, rng)
         if through:
             w = w - 2 * (w * n[:, None]).sum(axis=-1, keepdims=True) * n[:, None]
-        share = sum((_shown(lobe, cosine, through) for lobe in lobes), np.zeros((len(n), 3)))
+        share = sum((_shown(lobe, cosine) for lobe in lobes), np.zeros((len(n), 3)))
         directions.append(w)
         shares.append(np.repeat(share[:, None] / SPREAD, SPREAD, axis=1))
     return np.concatenate(directions, axis=1), np.concatenate(shares, axis=1)
 
 
-def _shown(lobe: Lobe, cosine: Floats, through: bool) -> Floats:
+def _shown(lobe: Lobe, cosine: Floats) -> Floats:
     """(n, 3) share of light that a lobe passes on."""
-    reflected = fresnel(cosine, np.asarray(lobe.r0, float))
-    return np.asarray(np.asarray(lobe.k, float) * (1 - reflected if through else reflected))
+    return np.concatenate([tint(cosine, lobe, c) for c in range(3)], axis=1)
 
 
 def _diffuse(around: Surroundings, x: Floats, n: Floats) -> tuple[Floats, Floats]:

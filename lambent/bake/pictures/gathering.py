@@ -20,7 +20,6 @@ from lambent.bake.tracing import path_tracer
 from lambent.bake.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats
 from lambent.core.geometry.triangles import triangle_areas
-from lambent.materials.bsdf import coupling
 
 MAX_DEPTH = 16  # surfaces on the longest path of a picture, mirrors included
 NEAR_TEXELS = 3.0  # a surface that a gathering path meets within this many of its own texels gathers once more
@@ -50,7 +49,7 @@ class Gathering:
         return dr.select(near, again, self.cache(si, active & ~near))
 
     def _gathered(self, si: Any, sampler: Any, active: Any, cache: path_tracer.Cache) -> Any:
-        reflected, transmitted, coupled = self.cache.colours(si, active)
+        reflected, transmitted, number = self.cache.colours(si, active)
         brightness = [dr.sum(colour) for colour in (reflected, transmitted)]  # dr.mean compiles for every width
         share = brightness[1] / dr.maximum(brightness[0] + brightness[1], 1e-9)
         active = active & (brightness[0] + brightness[1] > 0)
@@ -62,11 +61,10 @@ class Gathering:
         points = path_tracer.Points(
             si.p, normal * dr.mulsign(turn, cos_o), mi.Vector3f(si.n) * dr.mulsign(turn, dr.dot(si.n, viewer))
         )
-        coupled &= ~across
         found = mi.Color3f(0.0)
         for light, w in self._arriving(points, sampler, active, cache):
             cos_i = dr.dot(w, points.normal)
-            found += light * dr.select(coupled, coupling(dr.clip(cos_i, 0, 1), dr.abs(cos_o), dr), 1.0)
+            found += light * dr.select(across, 1.0, self.cache.shares.between(number, cos_i, dr.abs(cos_o), active))
         weight = dr.select(across, dr.rcp(dr.maximum(share, 1e-6)), dr.rcp(dr.maximum(1 - share, 1e-6)))
         return dr.select(active, dr.select(across, transmitted, reflected) * weight * found, 0.0)
 

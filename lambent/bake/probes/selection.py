@@ -18,6 +18,7 @@ error decides the following choices, each made if it lowers the error to WORTH:
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,7 +38,7 @@ from lambent.core.geometry.cubemap import sample
 from lambent.core.geometry.directions import basis, normalize, reflect
 from lambent.core.light.colour import luminance
 from lambent.materials.document import Material
-from lambent.materials.lobes import fresnel
+from lambent.materials.lobes import fresnel, widths
 
 RAYS = 2048
 LEAST_RAYS = 64  # fewer are not significant
@@ -98,7 +99,7 @@ def largest_r0(material: Material) -> float:
 
 def widest_lobe(material: Material) -> float:
     """Roughness sqrt(mx my) of a material's widest lobe; 0 without lobes."""
-    return max(((lobe.mx * lobe.my) ** 0.5 for lobe in material.lobes), default=0.0)
+    return max((math.prod(widths(lobe)) ** 0.5 for lobe in material.lobes), default=0.0)
 
 
 def spread_mirrored(view: Floats, n: Floats, roughness: float, spread: int, rng: np.random.Generator) -> Floats:

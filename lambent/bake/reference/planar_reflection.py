@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from lambent.bake.light.cache import LightMapCache
 from lambent.bake.running.tiles import slices
+from lambent.bake.tracing.array_ops import array_ops
 from lambent.bake.tracing.rays import block_sums, vectors
 from lambent.bake.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats
 from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe
-from lambent.materials.lobes import fresnel
+from lambent.materials.lobes import ArrayOps, density_of_slopes, slope_radius, tint
 from lambent.scenes.scene import Scene
 
 RAYS_AT_ONCE = 1 << 21  # a few hundred MiB, with progress about every second
@@ -40,7 +41,7 @@ class ReflectionTracer:
         self._numbers = builder.numbers
         self._emission = mi.Color3f(np.array([o.emission for o in scene.objects], np.float32).T.copy())
         self._lamps = [_enclosing_ball(o.mesh.positions.astype(float)) for o in scene.objects if max(o.emission) > 0]
-        self._sky = mi.Color3f(*sky)
+        self._sky, self._ops = mi.Color3f(*sky), array_ops()
 
     def distance(self, origin: Floats, directions: Floats) -> Floats:
         """Distance (k,) from a point (3,) along unit directions (k, 3), infinite without a hit."""
@@ -70,7 +71,7 @@ class ReflectionTracer:
         origin = dr.gather(mi.Point3f, vectors(mi.Point3f, points), at)
         lamps = self._lamps if lobe.mx * lobe.my > WIDE else []
         cones = [_cone(origin, lamp) for lamp in lamps]
-        h = _half_vectors(lobe, at, k, starts)
+        h = _half_vectors(lobe, at, k, starts, self._ops)
         directions = [2 * dr.dot(view, h) * h - view, *(_within(cone, _uniform(at, k, starts)) for cone in cones)]
         light = mi.Color3f(0.0)
         for wi in directions:
@@ -87,16 +88,14 @@ class ReflectionTracer:
         h = dr.normalize(wi + view)
         cos_d = dr.dot(view, h)
         valid = (cos_d > 1e-4) & (wi.y > 1e-4)
-        r0 = mi.Color3f(*lobe.r0)
-        tint = mi.Color3f(*lobe.k) * fresnel(dr.clip(cos_d, 0, 1), r0, dr)
-        gain = tint * wi.y / ((wi.y * view.y) ** lobe.alpha * h.y)
+        shown = mi.Color3f(*(tint(dr.clip(cos_d, 0, 1), lobe, c, self._ops) for c in range(3)))
+        gain = shown * wi.y / ((wi.y * view.y) ** lobe.alpha * h.y)
         si = self._scene.ray_intersect(mi.Ray3f(origin, wi), mi.RayFlags.All, True, valid)
         hit = valid & si.is_valid()
         number = self._numbers.at(si, hit)
         seen = self._cache(si, hit) + dr.gather(mi.Color3f, self._emission, number, hit)
         r2 = (h.x / (h.y * lobe.mx)) ** 2 + (h.z / (h.y * lobe.my)) ** 2
-        slopes = 1 / (1 + r2) ** 2 if lobe.distribution == "ggx" else dr.exp(-r2)
-        density = slopes / (dr.pi * lobe.mx * lobe.my * h.y**3 * 4 * cos_d)
+        density = density_of_slopes(r2, lobe, self._ops) / (dr.pi * lobe.mx * lobe.my * h.y**3 * 4 * cos_d)
         return dr.select(valid, gain * dr.select(hit, seen, self._sky), 0.0), dr.select(valid, density, 0.0)
 
 
@@ -124,10 +123,10 @@ def _cone_density(cone: tuple[mi.Vector3f, mi.Float], w: mi.Vector3f) -> mi.Floa
     return dr.select(0.5 * dr.squared_norm(w - cone[0]) <= cone[1], dr.inv_two_pi / cone[1], 0.0)
 
 
-def _half_vectors(lobe: Lobe, at: mi.UInt32, k: mi.UInt32, starts: NDArray[np.uint64]) -> mi.Vector3f:
+def _half_vectors(lobe: Lobe, at: mi.UInt32, k: mi.UInt32, starts: NDArray[np.uint64], ops: ArrayOps) -> mi.Vector3f:
     """World half vectors of sample k at point `at`: an additive sequence (Roberts 2018) starting at `starts`."""
     u, v = _uniform(at, k, starts)
-    r = dr.sqrt(u / (1 - u)) if lobe.distribution == "ggx" else dr.sqrt(-dr.log(1 - u))
+    r = slope_radius(u, lobe, ops)
     phi = 2 * dr.pi * v
     return dr.normalize(mi.Vector3f(r * lobe.mx * dr.cos(phi), 1.0, -r * lobe.my * dr.sin(phi)))
 

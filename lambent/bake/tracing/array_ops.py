@@ -18,7 +18,7 @@ def array_ops() -> ArrayOps:
     def gather(table: Any, index: Any) -> Any:
         if isinstance(table, np.ndarray):
             if id(table) not in uploaded:
-                uploaded[id(table)] = table, mi.Float(table)
+                uploaded[id(table)] = table, mi.Float(np.asarray(table, np.float32))
             table = uploaded[id(table)][1]
         return dr.gather(mi.Float, table, mi.UInt32(index))
 

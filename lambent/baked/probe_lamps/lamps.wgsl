@@ -17,7 +17,7 @@ const LAST_OUT = 0.54;
 
 // Number of groups taken out of the cube map for a lobe; a fraction is the share of the last group (probe_lamps.py).
 fn groups_out(lobe: LambentLobe) -> f32 {
-    let share = smoothstep(vec4f(FIRST_OUT), vec4f(LAST_OUT), sqrt(lobe.mx * lobe.my) / lamps[0]);
+    let share = smoothstep(vec4f(FIRST_OUT), vec4f(LAST_OUT), lobe.spread * sqrt(lobe.mx * lobe.my) / lamps[0]);
     return dot(share, vec4f(1.0));
 }
 

@@ -24,7 +24,8 @@ def command(
     lobes: Annotated[
         str,
         typer.Option(
-            help="Lobes per side: 1 to 4, or auto, which adds lobes as long as each cuts the error by --gain."
+            help="Lobes per side: 1 to 4; curve, one lobe shaped by curves; or auto, which adds lobes as long as each "
+            "cuts the error by --gain, and takes a curve lobe where that is better."
         ),
     ] = "1",
     metric: Annotated[str, typer.Option(help="Error to minimise: l1, l2_ngan, cuberoot or log.")] = "cuberoot",
@@ -124,11 +125,12 @@ def _check_environment(file: Path, report: Path | None) -> None:
     read_image(file)
 
 
-def _count(lobes: str) -> int | Literal["auto"]:
-    if lobes == "auto":
-        return "auto"
+def _count(lobes: str) -> int | Literal["auto", "curve"]:
+    if lobes in ("auto", "curve"):
+        return "auto" if lobes == "auto" else "curve"
     if not lobes.isdecimal():
-        raise UserError("cannot be read as a number of lobes", field="--lobes", got=lobes, expected="1 to 4, or auto")
+        expected = "1 to 4, curve or auto"
+        raise UserError("cannot be read as a number of lobes", field="--lobes", got=lobes, expected=expected)
     return int(lobes)
 
 

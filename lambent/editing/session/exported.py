@@ -1,4 +1,4 @@
-"""Edited materials as material documents: exact where curves still match a document's, otherwise fitted lobes.
+"""Edited materials as material documents: curve lobes, exact where curves still match a document's, or fitted lobes.
 
 Lobes are fitted to edited curves as a measured table, as to any measurement. Its tuples lie on a grid of half vectors
 that is fine where the highlight's curves are steep: it resolves a highlight of any width, and any ring drawn by hand.
@@ -19,7 +19,7 @@ from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material, Provenance, Side
 from lambent.materials.export.contract import Verdict, verdict_of
 from lambent.materials.factored.curve import END_RAD, Curve, angles_rad
-from lambent.materials.factored.of_lobes import lobe_terms, of_material, prefixed
+from lambent.materials.factored.of_lobes import as_curve_lobe, as_kd_curve, lobe_terms, of_material, prefixed
 from lambent.materials.factored.terms import Editable
 from lambent.materials.fitting.account import evaluate
 from lambent.materials.fitting.fit import fit
@@ -125,13 +125,22 @@ def _kept(document: Material, start: Editable, edited: Editable) -> tuple[Materi
     for prefix, lobe in prefixed(document.lobes):
         names = [term.name for term in lobe_terms(lobe, prefix)[0]]
         by = _common([multiples[name] for name in names])
-        if by is None:
+        if by is not None:
+            lobes.append(lobe.model_copy(update={"k": triple(np.multiply(lobe.k, by))}))
+            continue
+        term = next(term for term in edited.terms if term.name == names[0])
+        bent = as_curve_lobe(lobe, edited.curves, np.array(term.scale), prefix) if len(names) == 1 else None
+        if bent is None:
             rest |= set(names)
         else:
-            lobes.append(lobe.model_copy(update={"k": triple(np.multiply(lobe.k, by))}))
+            lobes.append(bent)
     changes: dict[str, object] = {"lobes": tuple(lobes), "provenance": None}
     for name, coefficient in (("diffuse", "kd"), ("diffuse through", "kt_d")):
         by = multiples.get(name, np.ones(3))
+        of_kd = next((term for term in edited.terms if term.name == name and term.viewer), None)
+        if by is None and of_kd is not None and (nodes := as_kd_curve(edited.curves[name])):
+            changes["kd_curve"], squared = nodes
+            by = squared * np.pi * np.array(of_kd.scale) / np.maximum(getattr(document, coefficient), 1e-30)
         if by is None:
             rest.add(name)
         changes[coefficient] = triple(np.multiply(getattr(document, coefficient), 0.0 if by is None else by))

@@ -19,6 +19,7 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import BLACK, Lobe, Material
 from lambent.materials.export.contract import Cost, Subject
 from lambent.materials.export.resampling.resampled import CHECK_LOG2, FIT_LOG2, Pairs, pairs_of
+from lambent.materials.lobes import with_distribution
 from lambent.materials.measured.inspecting.metrics import CUBEROOT, errors_and_shares, light_ratios
 
 
@@ -108,7 +109,7 @@ def likeness(material: Material, tool: Tool, lost: Sequence[str], progress: Prog
     pairs = pairs_of(material, FIT_LOG2, seed=0)
     kd, kt_d = (np.array(rgb[: pairs.samples.f.shape[1]]) for rgb in (material.kd, material.kt_d))
     found = Likeness(kd, kt_d)
-    if material.lobes or material.kd_coupled:
+    if material.lobes or material.kd_coupled or material.kd_curve is not None:
         spaces = [_diffuse_space(kd), _diffuse_space(kt_d), *(_space(lobe, tool, pairs) for lobe in material.lobes)]
         start, low, high = (np.concatenate(parts) for parts in zip(*spaces, strict=True))
 
@@ -293,6 +294,12 @@ def shape_losses(material: Material, *, beckmann_kept: bool = False) -> list[str
         lost.append("the diffuse term's coupling to Fresnel: the format has another one, or none")
     if not beckmann_kept and any(lobe.distribution == "beckmann" for lobe in material.lobes):
         lost.append("Beckmann lobes became GGX lobes, whose tails are longer; a fit of GGX lobes loses less")
+    if any(lobe.shape is not None for lobe in material.lobes):
+        lost.append("curve lobes became the nearest GGX lobes; a table keeps them: --as rgl, merl or lbnl_xml")
+    if any(lobe.fresnel is not None for lobe in material.lobes):
+        lost.append("Fresnel curves became the nearest reflectance at normal incidence")
+    if material.kd_curve is not None:
+        lost.append("the diffuse term's curve: the format has a constant one")
     if material.lobes:
         alphas = ", ".join(f"{lobe.alpha:.2g}" for lobe in material.lobes)
         lost.append(f"alpha ({alphas}): the exponent of the cosines becomes Smith's masking")
@@ -301,6 +308,8 @@ def shape_losses(material: Material, *, beckmann_kept: bool = False) -> list[str
 
 def slope_start(lobe: Lobe, distribution: str) -> tuple[float, float]:
     """Start roughness along t and b: a GGX peak is as wide as a Beckmann peak of 1.2 times its roughness."""
+    if lobe.shape is not None:
+        lobe = with_distribution(lobe, "ggx")
     scale = 0.8 if lobe.distribution == "beckmann" and distribution == "ggx" else 1.0
     mx, my = (float(np.clip(scale * m, ALPHA_MIN, ALPHA_MAX)) for m in (lobe.mx, lobe.my))
     return mx, my

@@ -24,7 +24,7 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.files import write_text
 from lambent.core.progress import Progress, silent
-from lambent.materials.document import Lobe, Material
+from lambent.materials.document import Distribution, Lobe, Material
 from lambent.materials.export import matching
 from lambent.materials.export.contract import Cost, Kind, Subject
 from lambent.materials.export.matching import Likeness, Part, Tool, brightness, material_of, rounded, shape_losses
@@ -66,7 +66,7 @@ def _eval(pairs: Pairs, part: Part) -> Floats:
         f[shown] = (part.colour * facets[:, None])[shown]
         return f
     eta, kappa = (float(v) for v in part.others)
-    facets = pairs.facets(part.mx, part.my, "separable", part.lobe.distribution)
+    facets = pairs.facets(part.mx, part.my, "separable", _distribution(part.lobe))
     near = ~pairs.far
     f[near] = (part.colour * (conductor(pairs.cos_d, eta, kappa) * facets)[:, None])[near]
     return f
@@ -83,8 +83,8 @@ def _colour_start(lobe: Lobe) -> Floats:
     return np.asarray(k * (1 - r0) if lobe.side == "transmission" else k * r0 / max(float(r0.mean()), 1e-3))
 
 
-def _distribution(lobe: Lobe) -> str:
-    return lobe.distribution if lobe.side == "reflection" else "ggx"
+def _distribution(lobe: Lobe) -> Distribution:
+    return "beckmann" if lobe.distribution == "beckmann" and lobe.side == "reflection" else "ggx"
 
 
 TOOL = Tool(NAME, _eval, _others, _colour_start, COLOUR_MAX, _distribution, rounded)
@@ -175,7 +175,7 @@ def _near(found: Likeness, part: Part | None, share: float) -> ET.Element:
         return _made("diffuse", _colour("reflectance", found.kd / share))
     return _made(
         "roughconductor",
-        ("string", "distribution", part.lobe.distribution),
+        ("string", "distribution", _distribution(part.lobe)),
         ("float", "alpha_u", part.mx),
         ("float", "alpha_v", part.my),
         *(("spectrum", name, float(value)) for name, value in zip(("eta", "k"), part.others, strict=True)),

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.plain import triple
-from lambent.materials.document import Lobe, Material
+from lambent.materials.document import COEFFICIENT_MAX, COSINE_NODES, Lobe, Material
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.quotients import CoupledDiffuse, Microfacets, One
 from lambent.materials.factored.terms import Editable, Factor, Term
-from lambent.materials.fresnel import schlick
+from lambent.materials.lobes import NUMPY, density_of_slopes, tint
+from lambent.materials.slope_curve import NODES_RHO, ROW, at_cosine, normalised, slope_table
+
+STEEPEST_RAD = 1.57  # beyond, the squared tangent overflows the curve's range
+SAME = 1e-3  # relative difference up to which channels share a curve
 
 
 @dataclass(frozen=True)
@@ -45,13 +49,72 @@ def ggx(mx: float, my: float, name: str = "highlight") -> Highlight:
     return Highlight((factor,), {name: curve}, 4.0 if stretched else 0.0)
 
 
+def of_curve(lobe: Lobe, name: str = "highlight") -> Highlight:
+    """A curve lobe: one curve over theta_h, stretched to circles if anisotropic."""
+    m, stretched = float(np.sqrt(lobe.mx * lobe.my)), lobe.mx != lobe.my
+
+    def density(x: Floats) -> Floats:
+        value = density_of_slopes((np.tan(np.minimum(x, STEEPEST_RAD)) / m) ** 2, lobe) / (np.pi * m * m)
+        return np.asarray(value / (1 if stretched else _cos4(x)))
+
+    factor = Factor(name, "theta_h", stretch=float(np.sqrt(lobe.my / lobe.mx)))
+    return Highlight((factor,), {name: Curve.of(density)}, 4.0 if stretched else 0.0)
+
+
+def as_curve_lobe(lobe: Lobe, curves: Mapping[str, Curve], scale: Floats, prefix: str = "") -> Lobe | None:
+    """The curve lobe that has edited `curves` of a lobe's terms, times a colour (3,); None if no curve lobe has.
+
+    One curve over theta_h serves all channels: None if their highlights are no multiples of each other, and for a
+    Beckmann lobe of two slopes, which has two curves.
+    """
+    highlight, fresnel = curves.get(f"{prefix}highlight"), curves.get(f"{prefix}fresnel")
+    if highlight is None or fresnel is None:
+        return None
+    m, stretched = float(np.sqrt(lobe.mx * lobe.my)), lobe.mx != lobe.my
+    theta = np.arctan(NODES_RHO * m)
+    density = highlight.at(theta) * (np.pi * m * m) * (1 if stretched else np.cos(theta)[:, None] ** 4)
+    size = density.max(axis=0)
+    if not (density >= 0).all() or size.max() <= 0:
+        return None
+    shape = density[:, int(np.argmax(size))] / size.max()
+    if np.abs(density - size * shape[:, None]).max() > SAME * size.max():
+        return None
+    mass = np.exp(-slope_table(tuple(shape.tolist()))[::ROW].max())  # twice the integral of the shape over rho drho
+    tint = fresnel.at(np.arccos(np.linspace(0, 1, COSINE_NODES))) * (size * mass * np.asarray(scale))
+    k = tint.max(axis=0)
+    share = np.divide(tint, k, out=np.zeros_like(tint), where=k > 0)
+    if (tint < 0).any() or not (k <= COEFFICIENT_MAX).all():
+        return None
+    red, green, blue = (1 - share if lobe.side == "transmission" else share).T.tolist()
+    update = {"distribution": "curve", "shape": tuple(shape.tolist()), "fresnel": (red, green, blue), "k": triple(k)}
+    return Lobe.model_validate(lobe.model_dump() | update)
+
+
+def as_kd_curve(curve: Curve) -> tuple[tuple[float, ...], Floats] | None:
+    """Nodes of the `kd_curve` that an edited curve of a reciprocal diffuse term is, and the factor (3,) of kd, or None.
+
+    One curve serves all channels: None if they are no multiples of each other.
+    """
+    nodes = curve.at(np.arccos(np.linspace(0, 1, COSINE_NODES)))
+    size = nodes.max(axis=0)
+    shape = nodes[:, int(np.argmax(size))] / max(size.max(), 1e-30)
+    if (nodes < 0).any() or size.max() <= 0 or np.abs(nodes - size * shape[:, None]).max() > SAME * size.max():
+        return None
+    one = tuple(shape.tolist())
+    return one, (size * shape.max() / max(normalised(one))) ** 2
+
+
 def lobe_terms(lobe: Lobe, prefix: str = "") -> tuple[tuple[Term, ...], dict[str, Curve]]:
     """Terms and curves of a Kurt lobe; names begin with `prefix`.
 
     If the highlight takes both curves, none is left for Fresnel: two terms then share them and blend by Schlick's
     factor.
     """
-    highlight = (ggx if lobe.distribution == "ggx" else beckmann)(lobe.mx, lobe.my, f"{prefix}highlight")
+    name = f"{prefix}highlight"
+    if lobe.shape is not None:
+        highlight = of_curve(lobe, name)
+    else:
+        highlight = (ggx if lobe.distribution == "ggx" else beckmann)(lobe.mx, lobe.my, name)
     k, r0 = np.array(lobe.k), np.array(lobe.r0)
     across = lobe.side == "transmission"
 
@@ -63,7 +126,8 @@ def lobe_terms(lobe: Lobe, prefix: str = "") -> tuple[tuple[Term, ...], dict[str
         sign = -1 if across else 1
         normal = term("specular", k * (1 - r0 if across else r0), highlight.factors)
         return (normal, term("grazing", sign * k * (1 - r0), highlight.factors, grazing=True)), highlight.curves
-    fresnel = Curve.of(lambda x: 1 - schlick(np.cos(x), r0) if across else schlick(np.cos(x), r0))
+    one = lobe.model_copy(update={"k": (1.0, 1.0, 1.0)})
+    fresnel = Curve.of(lambda x: np.stack([tint(np.maximum(np.cos(x), 0), one, c) for c in range(3)], axis=-1))
     factors = (*highlight.factors, Factor(f"{prefix}fresnel", "theta_d"))
     return (term("specular", k, factors),), {**highlight.curves, f"{prefix}fresnel": fresnel}
 
@@ -74,8 +138,11 @@ def of_material(material: Material) -> Editable:
     curves: dict[str, Curve] = {}
     if any(material.kd):
         quotient, scale = (CoupledDiffuse(), 1.0) if material.kd_coupled else (One(), 1 / np.pi)
-        terms.append(Term("diffuse", quotient, triple(scale * np.array(material.kd)), (Factor("diffuse", "theta_i"),)))
-        curves["diffuse"] = Curve.constant()
+        bent = material.kd_curve
+        curves["diffuse"] = Curve.constant() if bent is None else _over_cosine(normalised(bent))
+        viewer = None if bent is None else "diffuse"
+        scale_r = triple(scale * np.array(material.kd))
+        terms.append(Term("diffuse", quotient, scale_r, (Factor("diffuse", "theta_i"),), viewer=viewer))
     if any(material.kt_d):
         scale_t = triple(np.array(material.kt_d) / np.pi)
         factor = Factor("diffuse through", "theta_i")
@@ -86,6 +153,10 @@ def of_material(material: Material) -> Editable:
         terms += more
         curves |= of_lobe
     return Editable(material.name, tuple(terms), curves)
+
+
+def _over_cosine(nodes: tuple[float, ...]) -> Curve:
+    return Curve.of(lambda x: at_cosine(np.cos(x), nodes, NUMPY))
 
 
 def prefixed(lobes: Sequence[Lobe]) -> list[tuple[str, Lobe]]:

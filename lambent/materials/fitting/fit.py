@@ -20,6 +20,7 @@ from lambent.materials.document import Distribution, Kind, Lobe, Material, Prove
 from lambent.materials.fitting import account, gradient, parameters
 from lambent.materials.fitting.account import Comparison, Curve
 from lambent.materials.fitting.choices import DISTRIBUTION, DistributionChoice
+from lambent.materials.fitting.curves import DARK, CurveFit, fit_curve
 from lambent.materials.fitting.gradient import Bounds
 from lambent.materials.fitting.parameters import BOUNDS, RETRO_BOUNDS, SHAPE, Box, Fixed, Ranges, parameter
 from lambent.materials.fitting.problem import Candidate, Found, Mixture, Problem, problem_of
@@ -35,11 +36,12 @@ DISTRIBUTIONS: dict[str, tuple[Distribution, ...]] = {
     "ggx": ("ggx",),
     "best": ("beckmann", "ggx"),
 }
+Lobes = int | Literal["auto", "curve"]
 MAX_LOBES = 4
+CURVED = ("kd", "kt_d", "alpha", "t_alpha", "kr", "r_mx", "r_my", "r_r0", "r_alpha")  # names with a curve lobe
 GAIN = 0.05  # share of E that another lobe must remove if the number of lobes is "auto"
 RETRO_RATIO = 2.0  # median of f near the light over that beside it, above which a retro lobe is tried
 RETRO_GAIN = 0.1  # share of E that a retro lobe must remove to be taken
-DARK = 1e-5  # a smaller diffuse coefficient counts as 0
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ class Task:
 def fit(
     table: MeasuredSamples | MeasuredTable,
     *,
-    lobes: int | Literal["auto"] = 1,
+    lobes: Lobes = 1,
     metric: str = "cuberoot",
     distribution: DistributionChoice = DISTRIBUTION,
     coupled: bool = False,
@@ -116,8 +118,10 @@ def fit(
     Parameters
     ----------
     table : MeasuredSamples or MeasuredTable
-    lobes : int or "auto"
-        1 to 4 per side; "auto" adds lobes while each removes at least the share `gain` of the error.
+    lobes : int, "curve" or "auto"
+        1 to 4 per side; "curve" is one lobe whose density and Fresnel reflectance are curves. "auto" adds lobes while
+        each removes at least the share `gain` of the error, and takes a curve lobe instead if its error is smaller on
+        tuples held out, which its many numbers have not seen.
     metric : str
         The metric to minimise, one of `METRICS`; the result has E under all of them.
     distribution : "beckmann", "ggx" or "best"
@@ -152,14 +156,17 @@ def fit(
         parameter for a table without transmission; `keep_albedo` without a table.
     """
     began = time.perf_counter()
-    count, fix, ranges = MAX_LOBES if lobes == "auto" else lobes, fix or {}, ranges or {}
+    fix, ranges = fix or {}, ranges or {}
+    count = lobes if isinstance(lobes, int) else MAX_LOBES if lobes == "auto" else 1
     whole = table if isinstance(table, MeasuredTable) else whole
     _check(count, gain, distribution)
     if keep_albedo and whole is None:
         raise UserError("needs a whole table", field="keep_albedo", got="tuples")
     parameters.check(fix, ranges, count)
+    _check_curve(lobes, fix, ranges, keep_albedo)
+    curves_too = lobes == "curve" or (lobes == "auto" and not keep_albedo and {*fix, *ranges} <= {*CURVED})
     share = gain if lobes == "auto" else 0.0
-    kinds = DISTRIBUTIONS[distribution]
+    kinds = DISTRIBUTIONS["best" if lobes == "curve" else distribution]
     samples = table if isinstance(table, MeasuredSamples) else table.samples()
     curves = account.curves_of(whole, samples) if whole is not None else {}
     kept = curves if keep_albedo else {}
@@ -168,31 +175,36 @@ def fit(
     if far and not samples.transmitted.any():
         raise UserError("the table does not transmit", file=samples.info.file, field=far[0])
     found: dict[Side, Found] = {}
+    curved: dict[Side, CurveFit] = {}
     partial, tried = False, list[str]()
     try:
         for side in samples.sides:
             returns = side == "reflection" and _may_return(samples, task)
-            _fit_side(samples, side, task, _part_of(progress, 0, 1 + returns), found)
+            parts = 1 + returns + curves_too
+            _fit_side(samples, side, task, _part_of(progress, 0, parts), found)
             if returns:
                 other: dict[Side, Found] = {}
-                _fit_side(samples, side, task, _part_of(progress, 1, 2), other, retro=True)
-                tried = [_choose(found, other, task)]
+                _fit_side(samples, side, task, _part_of(progress, 1, parts), other, retro=True)
+                tried.append(_choose(found, other, task))
+            if curves_too and any(found[side].models[0].lobes[-1].k > 0):
+                one = _curve_of(found[side], side, task, _part_of(progress, parts - 1, parts))
+                taken, said = _worth(one, found[side], lobes)
+                tried.append(f"{side}: {said}")
+                if taken:
+                    curved[side] = one
     except (Cancelled, KeyboardInterrupt):
         partial = True
     material = Material(
         name=Path(samples.info.file).stem,
-        kd=_diffuse_rgb("reflection", samples, task, found),
-        kt_d=_diffuse_rgb("transmission", samples, task, found),
+        kd=_diffuse_rgb("reflection", samples, task, found, curved),
+        kt_d=_diffuse_rgb("transmission", samples, task, found, curved),
         kd_coupled=coupled,
-        lobes=tuple(
-            lobe
-            for side, one in found.items()
-            for lobe in (_lobes(side, one.models[-1].lobes, one.problem.distribution, task.fix) if one.models else ())
-        ),
+        kd_curve=curved["reflection"].kd_curve if "reflection" in curved else None,
+        lobes=tuple(lobe for side in found for lobe in _lobes_of(side, found[side], curved.get(side), task.fix)),
     )
     model = account.evaluate(material, samples)
     errors = errors_of(samples, model)
-    fitted = {side: one for side, one in found.items() if one.models}
+    fitted = {side: one for side, one in found.items() if one.models and side not in curved}
     compared = account.compare(curves, material)
     warnings = (
         *account.warnings_of(samples, material, model, fitted, task.metric.name),
@@ -231,6 +243,32 @@ def _check(lobes: int, gain: float, distribution: str) -> None:
         raise UserError("share out of range", field="gain", got=gain, expected="between 0 and 1")
     if not 1 <= lobes <= MAX_LOBES:
         raise UserError("number of lobes out of range", field="lobes", got=lobes, expected=f"1 to {MAX_LOBES}, or auto")
+
+
+def _check_curve(lobes: Lobes, fix: Fixed, ranges: Ranges, keep_albedo: bool) -> None:
+    """Raise `UserError` for restrictions that a curve lobe cannot keep."""
+    if lobes != "curve":
+        return
+    if keep_albedo:
+        raise UserError("constrains lobes with numbers", field="keep_albedo", got="a curve lobe", hint="leave it out")
+    for name in {*fix, *ranges} - {*CURVED}:
+        raise UserError("is no number of a curve lobe", field=name, expected=", ".join(CURVED))
+
+
+def _curve_of(found: Found, side: Side, task: Task, progress: Progress) -> CurveFit:
+    """The side's curve lobe, from its best model with one lobe besides a retro lobe."""
+    models = [model for model in found.models if any(not lobe.retro for lobe in model.lobes)]
+    box = next(box for box in found.boxes if not box.retro)
+    free = ("kd" if side == "reflection" else "kt_d") not in task.fix
+    return fit_curve(found.problem, models[0], box, free, task.seed, progress, compared=models[-1])
+
+
+def _worth(curve: CurveFit, found: Found, lobes: Lobes) -> tuple[bool, str]:
+    """Whether the curve lobe replaces the lobes, and why in words."""
+    ratio = curve.held_out / max(curve.lobes_held_out, 1e-300)
+    taken = lobes == "curve" or ratio < 1
+    said = f"a curve lobe has {ratio:.2f} times the error of {found.mirroring} lobe(s) on tuples held out"
+    return taken, said + ("" if lobes == "curve" else " (taken)" if taken else " (not taken)")
 
 
 def _may_return(samples: MeasuredSamples, task: Task) -> bool:
@@ -316,12 +354,27 @@ def _diffuse(samples: MeasuredSamples, side: Side, fix: Fixed) -> Floats:
     return np.array([diffuse_mode(samples.f[here, c], weight) for c in range(channels)])
 
 
-def _diffuse_rgb(side: Side, samples: MeasuredSamples, task: Task, found: dict[Side, Found]) -> Triple:
+def _diffuse_rgb(
+    side: Side, samples: MeasuredSamples, task: Task, found: dict[Side, Found], curved: dict[Side, CurveFit]
+) -> Triple:
     """kd or kt_d of the fitted model, or of the histogram if the fit has none."""
+    if side in curved:
+        return _rgb(np.where(curved[side].diffuse < DARK, 0.0, curved[side].diffuse))
     if side in found and found[side].models:
         diffuse = found[side].models[-1].diffuse
         return _rgb(np.where(diffuse < DARK, 0.0, diffuse))
     return _rgb(_diffuse(samples, side, task.fix))
+
+
+def _lobes_of(side: Side, found: Found, curve: CurveFit | None, fix: Fixed) -> Iterator[Lobe]:
+    """The lobes of a side in the form of a document: those found, or a curve lobe for all but the retro lobe."""
+    if not found.models:
+        return
+    lobes = found.models[-1].lobes
+    if curve is not None:
+        yield curve.lobe
+        lobes = tuple(one for one in lobes if one.retro)
+    yield from _lobes(side, lobes, found.problem.distribution, fix)
 
 
 def _lobes(side: Side, candidates: Sequence[Candidate], distribution: Distribution, fix: Fixed) -> Iterator[Lobe]:
@@ -364,9 +417,9 @@ def _by_lobes(found: dict[Side, Found]) -> list[str]:
     return lines
 
 
-def _fewer(found: dict[Side, Found], lobes: int | Literal["auto"]) -> list[str]:
+def _fewer(found: dict[Side, Found], lobes: Lobes) -> list[str]:
     return [
         f"{side}: {count} lobe(s); another one reduces the error no further"
         for side, one in found.items()
-        if lobes != "auto" and 0 < (count := one.mirroring) < lobes
+        if isinstance(lobes, int) and 0 < (count := one.mirroring) < lobes
     ]

@@ -71,7 +71,7 @@ def minimise(problem: Problem, bounds: Bounds, start: Mixture, steps: int, stop_
         matrix, gradient = _normal_equations(problem, bounds, current, unknowns)
         before = error
         while damping < most:
-            there = _step(matrix, gradient, damping, x, lo, hi)
+            there = damped_step(matrix, gradient, damping, x, lo, hi)
             candidate = _moved(bounds, start, unknowns, there)
             reached = problem.remaining(candidate)
             if reached < error:
@@ -83,7 +83,7 @@ def minimise(problem: Problem, bounds: Bounds, start: Mixture, steps: int, stop_
     return current, error
 
 
-def _step(matrix: Floats, gradient: Floats, damping: float, x: Floats, lo: Floats, hi: Floats) -> Floats:
+def damped_step(matrix: Floats, gradient: Floats, damping: float, x: Floats, lo: Floats, hi: Floats) -> Floats:
     """End point of a damped step: the minimum of the damped quadratic within the bounds (active set)."""
     diagonal = np.diag(matrix)
     damped = matrix + damping * np.diag(np.maximum(diagonal, 1e-12 * diagonal.max() + 1e-300))
@@ -113,10 +113,7 @@ def _normal_equations(
             parts = _coefficients(mixture, channel, c.dtype)[:, None] * terms
             model = parts.sum(axis=0)
             residual = target - metric.transform(model)
-            w = block.w
-            if metric.power == 1:
-                size = np.abs(target)
-                w = w / np.maximum(np.abs(residual), LEAST_RESIDUAL * (size + size.mean()) + TINY)
+            w = reweighted(block, target, residual)
             if not metric.linear:
                 parts *= metric.slope(model)
             here, rows = _rows(unknowns, channel, parts, slopes, c.dtype)
@@ -126,6 +123,14 @@ def _normal_equations(
     if problem.kept is not None:
         _add_albedos(problem.kept, bounds, mixture, unknowns, matrix, gradient)
     return matrix, gradient
+
+
+def reweighted(block: Problem, target: Floats, residual: Floats) -> Floats:
+    """(N,) weights of least squares: the metric's, for L1 divided by the residuals."""
+    if block.metric.power != 1:
+        return block.w
+    size = np.abs(target)
+    return np.asarray(block.w / np.maximum(np.abs(residual), LEAST_RESIDUAL * (size + size.mean()) + TINY))
 
 
 def _add_albedos(

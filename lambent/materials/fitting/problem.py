@@ -16,15 +16,16 @@ from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.materials.bsdf import coupling
-from lambent.materials.document import Distribution, Side
+from lambent.materials.document import Distribution, Lobe, Side
 from lambent.materials.fitting.parameters import Box, from_search
 from lambent.materials.fitting.scale import Channel
 from lambent.materials.fresnel import schlick_weight
+from lambent.materials.lobes import density_of_slopes, tint
 from lambent.materials.measured.inspecting.metrics import BLOCK, Metric
 from lambent.materials.measured.protocol import MeasuredSamples
 
 MU, NU, R0, ALPHA = range(4)  # axes of the search coordinates
-PER_TUPLE = ("slope_x2", "slope_y2", "base", "log_cosines", "schlick", "diffuse", "measured", "c")
+PER_TUPLE = ("slope_x2", "slope_y2", "base", "cosines", "cos_d", "schlick", "log_cosines", "diffuse", "measured", "c")
 
 
 @dataclass(frozen=True)
@@ -55,11 +56,11 @@ class Problem:
 
     Attributes
     ----------
-    slope_x2, slope_y2, base, schlick : (1 or 2, N)
-        (hx/hz)^2, (hy/hz)^2, -ln(4 pi hz^4 cos_d) and (1 - cos_d)^5 of every tuple's half vector, then of its back
-        vector if retro lobes are allowed.
-    log_cosines : (N,)
-        ln(cos_i cos_o).
+    slope_x2, slope_y2, base, cos_d, schlick : (1 or 2, N)
+        (hx/hz)^2, (hy/hz)^2, -ln(4 pi hz^4 cos_d), cos_d and (1 - cos_d)^5 of every tuple's half vector, then of its
+        back vector if retro lobes are allowed.
+    cosines, log_cosines : (2, N), (N,)
+        cos_i and cos_o, and ln(cos_i cos_o).
     diffuse : (N,)
         f in 1/sr of the diffuse term with coefficient 1.
     measured : (C, N)
@@ -76,7 +77,9 @@ class Problem:
     slope_x2: Floats
     slope_y2: Floats
     base: Floats
+    cosines: Floats
     log_cosines: Floats
+    cos_d: Floats
     schlick: Floats
     diffuse: Floats
     measured: Floats
@@ -104,6 +107,15 @@ class Problem:
         mx, my, r0, alpha = (float(v) for v in shape)
         fresnel = self.fresnel(np.array(r0, dtype=self.schlick.dtype), retro)
         return np.asarray(self.density(mx, my, retro) * fresnel * np.exp(-alpha * self.log_cosines))
+
+    def of(self, lobe: Lobe) -> Floats:
+        """(C, N) f in 1/sr of a document's lobe without its coefficient k."""
+        which = int(lobe.retro)
+        slope2 = self.slope_x2[which] / lobe.mx**2 + self.slope_y2[which] / lobe.my**2
+        log_rest = self.base[which] - np.log(lobe.mx * lobe.my) - lobe.alpha * self.log_cosines
+        density = density_of_slopes(slope2, lobe) * np.exp(log_rest)
+        plain = lobe.model_copy(update={"k": (1.0, 1.0, 1.0)})
+        return np.stack([density * tint(self.cos_d[which], plain, c) for c in range(len(self.measured))])
 
     def log_derivatives(self, shape: Floats, tied: bool, retro: bool = False) -> tuple[Floats, Floats, Floats, Floats]:
         """Derivatives (N,) of ln basis by ln mx (with ln my if `tied`), ln my, ln r0 and alpha."""
@@ -246,7 +258,7 @@ def problem_of(
     wi, wo = (w[here].T.astype(np.float64) for w in (samples.wi, samples.wo))
     cos_i, cos_o = np.abs(wi[2]), np.abs(wo[2])
     kinds = [_half_vector_terms(sign * wi[:2], wo[:2], cos_i, cos_o) for sign in ((1.0, -1.0) if retro else (1.0,))]
-    slope_x2, slope_y2, base, schlick = (np.stack(arrays) for arrays in zip(*kinds, strict=True))
+    slope_x2, slope_y2, base, cos_d = (np.stack(arrays) for arrays in zip(*kinds, strict=True))
     w, c = metric.terms(samples)
     return Problem(
         side,
@@ -255,8 +267,10 @@ def problem_of(
         slope_x2,
         slope_y2,
         base,
+        np.stack([cos_i, cos_o]),
         np.log(np.maximum(cos_i * cos_o, 1e-12)),
-        schlick,
+        cos_d,
+        schlick_weight(cos_d),
         np.full_like(cos_o, 1 / np.pi) * (coupling(cos_i, cos_o) if coupled and side == "reflection" else 1.0),
         np.ascontiguousarray(samples.f[here].T.astype(np.float64)),
         w[here],
@@ -265,13 +279,13 @@ def problem_of(
 
 
 def _half_vector_terms(wi: Floats, wo: Floats, cos_i: Floats, cos_o: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """slope_x2, slope_y2, base and schlick (N,) of `Problem`, from tangential components (2, N) and cosines (N,)."""
+    """slope_x2, slope_y2, base and cos_d (N,) of `Problem`, from tangential components (2, N) and cosines (N,)."""
     hx, hy, hz = wi[0] + wo[0], wi[1] + wo[1], cos_i + cos_o
     length2 = hx * hx + hy * hy + hz * hz
     cos_d = np.clip((hx * wo[0] + hy * wo[1] + hz * cos_o) / np.sqrt(length2), 1e-6, 1)
     hz2 = np.maximum(hz * hz, 1e-12)
     base = -np.log(4 * np.pi * (hz2 / length2) ** 2 * cos_d)
-    return hx * hx / hz2, hy * hy / hz2, base, schlick_weight(cos_d)
+    return hx * hx / hz2, hy * hy / hz2, base, cos_d
 
 
 def replace_metric(problem: Problem, samples: MeasuredSamples, metric: Metric) -> Problem:

@@ -23,7 +23,7 @@ from lambent.core.geometry.cubemap import face_directions
 from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.triangles import triangle_areas
 from lambent.core.light.colour import luminance
-from lambent.materials.bsdf import under_fresnel
+from lambent.materials.bsdf import diffuse_seen
 from lambent.realtime.light.baked import BakedScene
 from lambent.scenes.looks.retexturing import materials_without_uv
 from lambent.scenes.looks.textures import halved
@@ -169,8 +169,7 @@ class TextureDetails:
             at = np.flatnonzero(of == number)
             code = self._stored.texels[texel[at]].astype(np.int64)
             uv, cosine, there = self._looked_at(name, seen.texel.shape[1], at, code // 2, self._of_material(number))
-            coupled = self._baked.record.materials[self._stored.materials[number]].kd_coupled
-            shown = (under_fresnel(cosine) if coupled else np.ones_like(cosine))[:, None]
+            shown = diffuse_seen(cosine, self._baked.record.materials[self._stored.materials[number]])[:, None]
             values = ((shown * filtered(one, uv))[there].astype(np.float16) for one in both)
             parts.append((at[there], *values))
         at, before, after = (np.concatenate(one) for one in zip(*parts, strict=True))

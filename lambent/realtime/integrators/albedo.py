@@ -10,13 +10,15 @@ Split-sum, the method of common engines (Karis 2013), is kept for comparison: a 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import normalize
 from lambent.materials.document import Lobe
-from lambent.materials.lobes import fresnel
+from lambent.materials.lobes import mean_reflectance, tint, widths
 from lambent.realtime.integrators.patterns import lobe_points, rings_table
 
 FACTORS = 32  # at cos_o = (i + 1/2)/FACTORS, four to a row: FACTOR_ROWS in rings.wgsl
@@ -36,7 +38,7 @@ def normalised_rings_table(lobe: Lobe, n: int) -> Floats:
 
 def factors(lobe: Lobe, rows: Floats) -> NDArray[np.float32]:
     """Factors (FACTORS,): the lobe's albedo over its samples' (`rows`, (n, 4)), both averaged over azimuth."""
-    slopes = lobe_points(EXACT_SAMPLES, lobe.distribution == "ggx") * [lobe.mx, lobe.my]
+    slopes = lobe_points(EXACT_SAMPLES, lobe) * [lobe.mx, lobe.my]
     exact = _albedo(lobe, slopes, np.ones(EXACT_SAMPLES))
     found = _albedo(lobe, rows[:, :2].astype(float), rows[:, 3].astype(float))
     ratio = np.divide(exact, found, out=np.ones(FACTORS), where=found > 1e-6)
@@ -45,34 +47,32 @@ def factors(lobe: Lobe, rows: Floats) -> NDArray[np.float32]:
 
 def _albedo(lobe: Lobe, slopes: Floats, weight: Floats) -> Floats:
     """(FACTORS,) mean of weight f cos_i/pdf over half vectors of `slopes` (n, 2) and over azimuths of the viewer."""
-    cos_o, r0 = (np.arange(FACTORS) + 0.5) / FACTORS, float(np.mean(lobe.r0))
+    cos_o = (np.arange(FACTORS) + 0.5) / FACTORS
     round_lobe = lobe.mx == lobe.my and len(slopes) == EXACT_SAMPLES
     azimuths = np.zeros(1) if round_lobe else (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS * np.pi
     total = np.zeros(FACTORS)
     for phi in azimuths:
         cos_d, gain = gains(lobe, slopes, cos_o, phi)
-        reflected = fresnel(np.clip(cos_d, 0, 1), r0)
+        reflected = mean_reflectance(np.clip(cos_d, 0, 1), lobe)
         total += ((reflected if lobe.side == "reflection" else 1 - reflected) * gain * weight).mean(axis=1)
     return np.asarray(total / len(azimuths))
 
 
 def roughness_level(lobe: Lobe) -> float:
     """Level of the prefiltered cube for the lobe's mean roughness sqrt(mx my)."""
-    return float(min(1.0, (lobe.mx * lobe.my) ** 0.25) * (LEVELS - 1))
+    return float(min(1.0, math.prod(widths(lobe)) ** 0.25) * (LEVELS - 1))
 
 
 def albedo_table(lobe: Lobe, samples: int = 1024) -> Floats:
-    """Table (TABLE_ROWS, 4) of float32 rows (A, B, 0, 0) at cos_o = (row + 1/2)/TABLE_ROWS.
+    """Table (TABLE_ROWS, 4) of float32 rows at cos_o = (row + 1/2)/TABLE_ROWS: RGB of the albedo over k, and 0.
 
-    An isotropic lobe of roughness sqrt(mx my) replaces the lobe. With g = f cos/pdf without k and Fresnel,
-    A = E[(1 - (1 - wo.h)^5) g] and B = E[(1 - wo.h)^5 g]: the reflected albedo is k (r0 A + B), the transmitted
-    albedo k (1 - r0) A.
+    An isotropic lobe of roughness sqrt(mx my) replaces the lobe.
     """
-    slopes = np.sqrt(lobe.mx * lobe.my) * lobe_points(samples, lobe.distribution == "ggx")
+    slopes = np.sqrt(lobe.mx * lobe.my) * lobe_points(samples, lobe)
     cos_d, g = gains(lobe, slopes, (np.arange(TABLE_ROWS) + 0.5) / TABLE_ROWS)
-    schlick = fresnel(np.clip(cos_d, 0, 1), 0.0)
-    a, b = ((1 - schlick) * g).mean(axis=1), (schlick * g).mean(axis=1)
-    return np.column_stack([a, b, np.zeros((TABLE_ROWS, 2))]).astype(np.float32)
+    one = lobe.model_copy(update={"k": (1.0, 1.0, 1.0)})
+    albedos = [(tint(np.clip(cos_d, 0, 1), one, c) * g).mean(axis=1) for c in range(3)]
+    return np.column_stack([*albedos, np.zeros(TABLE_ROWS)]).astype(np.float32)
 
 
 def gains(lobe: Lobe, slopes: Floats, cos_o: Floats, phi_rad: float = 0.0) -> tuple[Floats, Floats]:

@@ -3,8 +3,7 @@
 A table has one row (x, y, z, w) per sample:
     x, y   slopes of the half vector, h = normalize(x, y, 1)
     z      half the log2 of the filter constant c: the sample looks up the solid angle c (wo.h) h_z^3 sr
-    w      weight of the sample, of mean 1; in the thesis's estimates the density of slopes relative to its peak,
-           exp(-r^2) for Beckmann
+    w      weight of the sample, of mean 1; in the thesis's estimates the density of slopes, exp(-r^2) for Beckmann
 with r the slope in units of (mx, my). Rows depend on the lobe alone, so the shader computes no exp, ratio or border.
 
 Sources: thesis M, section 4.4.3 (eqs 4.10-4.17); Colbert & Krivanek 2007, "GPU-based importance sampling".
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Floats
 from lambent.core.geometry.sequences import hammersley
 from lambent.materials.document import Lobe, Material
+from lambent.materials.lobes import density_of_slopes, slope_radius, widths
 
 RINGS: dict[int, tuple[int, ...]] = {
     1: (1,), 3: (3,), 5: (1, 4), 7: (1, 6), 9: (2, 7), 11: (1, 5, 5), 13: (1, 6, 6), 15: (1, 7, 7), 17: (1, 8, 8),
@@ -33,6 +33,7 @@ STRETCH = {3: 0.89, 5: 0.89, 7: 0.92}  # factor on the rings' radii; .93 for oth
 BIAS = {3: 0.5, 5: 0.6, 7: 0.75, 11: 0.75}  # filter size relative to filters that cover the lobe; .9 for other n
 MANY = 30  # from this number of samples on, filters hardly blur
 LINE_TEMPER = 1.16  # tau sqrt(n), see `line_pattern`
+LINE_POINTS = 4096  # of a lobe, whose quantiles place the samples of its line
 BORDER_MASS = 0.01  # share of the lobe outside its border (4.10)
 RING_XI1 = 0.6  # the thesis's ring, 40 % of the way to the border
 
@@ -55,7 +56,7 @@ class Pattern:
     weight: Floats
 
 
-def ring_pattern(n: int, ggx: bool = False) -> Pattern:
+def ring_pattern(n: int, lobe: Lobe) -> Pattern:
     """A centre and staggered rings; each ring's radius halves its mass.
 
     Ring samples carry equal mass, the centre more: 1.8/n of the lobe, by experiment. Filters of .6 of the covering size
@@ -73,12 +74,12 @@ def ring_pattern(n: int, ggx: bool = False) -> Pattern:
             weight[0] = mass
         else:
             mass = count * weight[-1]
-            r = ring_stretch(n) * float(radius(min((before + mass / 2) / n, 0.9999), ggx))
+            r = ring_stretch(n) * float(slope_radius(min((before + mass / 2) / n, 0.9999), lobe))
         phi = 2 * np.pi * np.arange(count) / count + (np.pi / count if j % 2 else 0)
         slopes.append(polar(r, phi))
         before += mass
     points = np.concatenate(slopes)
-    return Pattern(points, ring_bias(n) * weight / relative_density(points, ggx), weight)
+    return Pattern(points, ring_bias(n) * weight / density(points, lobe), weight)
 
 
 def ring_bias(n: int) -> float:
@@ -91,38 +92,33 @@ def ring_stretch(n: int) -> float:
     return STRETCH.get(n, 0.93 if n < MANY else 0.97)
 
 
-def line_pattern(n: int, ggx: bool = False) -> Pattern:
+def line_pattern(n: int, lobe: Lobe) -> Pattern:
     """Samples on the x axis, for lobes much longer than wide.
 
     The marginal of a Beckmann lobe is p = exp(-x^2). Samples of density p would leave its tails to one or two samples.
     So the density is p^tau and the weight p^(1 - tau): close to the trapezium rule, which is exact to many digits for a
-    Gaussian. tau, the filters and their growth outwards are by experiment. A GGX lobe, whose marginal is
-    (1 + x^2)^(-3/2), keeps samples of equal mass and the thesis's filter, narrowed by one level.
+    Gaussian. tau, the filters and their growth outwards are by experiment. Other lobes, whose tails are long, keep
+    samples of equal mass and the thesis's filter, narrowed by one level.
     """
     from scipy.special import erfinv
 
     t = (2 * np.arange(n) + 1) / n - 1
-    if ggx:
-        x = t / np.sqrt(1 - t * t)
-        weight, factor = np.ones(n), np.full(n, -np.log(BORDER_MASS) / 4)
-    else:
+    if lobe.distribution == "beckmann":
         tau = min(1.0, LINE_TEMPER / np.sqrt(n))
         x = erfinv(t) / np.sqrt(tau)
         weight = np.exp(-(1 - tau) * x * x)
         weight /= weight.mean()
         factor = min(0.45 + 0.027 * n, 1.0) * np.exp(0.25 * x * x)
+    else:
+        half = np.quantile(np.abs(lobe_points(LINE_POINTS, lobe)[:, 0]), np.abs(t))
+        x = np.sign(t) * half
+        weight, factor = np.ones(n), np.full(n, -np.log(BORDER_MASS) / 4)
     return Pattern(np.stack([x, np.zeros(n)], axis=-1), factor, weight)
 
 
-def radius(mass: Any, ggx: bool = False) -> Any:
-    """Slope, in units of m, inside which `mass` in [0, 1) of the lobe lies (4.6)."""
-    return np.sqrt(mass / (1 - mass)) if ggx else np.sqrt(-np.log1p(-np.asarray(mass)))
-
-
-def relative_density(slopes: Floats, ggx: bool = False) -> Floats:
-    """Density of slopes (n, 2) in units of (mx, my), relative to the centre's."""
-    r2 = np.sum(slopes * slopes, axis=-1)
-    return np.asarray(1 / (1 + r2) ** 2 if ggx else np.exp(-r2))
+def density(slopes: Floats, lobe: Lobe) -> Floats:
+    """Density of slopes (n, 2) in units of (mx, my), times pi: 1 at the centre of Beckmann and GGX."""
+    return np.asarray(density_of_slopes(np.sum(slopes * slopes, axis=-1), lobe))
 
 
 def line_share(lobe: Lobe, n: int) -> float:
@@ -167,8 +163,7 @@ def table(slopes: Floats, filter_factor: Floats, lobe: Lobe, fourth: Floats | No
 
 def rings_table(lobe: Lobe, n: int) -> Floats:
     """Table of the `rings` integrator: rings, or a line for lobes much longer than wide."""
-    ggx = lobe.distribution == "ggx"
-    rings, line = ring_pattern(n, ggx), line_pattern(n, ggx)
+    rings, line = ring_pattern(n, lobe), line_pattern(n, lobe)
     share = line_share(lobe, n)
     order = along_axis(rings.slopes, lobe)[1] if share > 0 else np.arange(n)
     factor = np.exp((1 - share) * np.log(rings.factor[order]) + share * np.log(line.factor))
@@ -176,17 +171,16 @@ def rings_table(lobe: Lobe, n: int) -> Floats:
     return table(blended(rings.slopes, line.slopes, lobe), factor, lobe, weight)
 
 
-def lobe_points(n: int, ggx: bool = False) -> Floats:
+def lobe_points(n: int, lobe: Lobe) -> Floats:
     """Hammersley points distributed by the lobe: (n, 2) slopes in units of (mx, my)."""
     u1, u2 = hammersley(n).T
-    return polar(radius(u1, ggx), 2 * np.pi * u2)
+    return polar(slope_radius(u1, lobe), 2 * np.pi * u2)
 
 
 def fis_table(lobe: Lobe, n: int) -> Floats:
     """Filtered importance sampling (Colbert & Krivanek 2007): Hammersley points, filter 1/(n pdf), no bias."""
-    ggx = lobe.distribution == "ggx"
-    slopes = lobe_points(n, ggx)
-    return table(slopes, 1 / relative_density(slopes, ggx), lobe)
+    slopes = lobe_points(n, lobe)
+    return table(slopes, 1 / density(slopes, lobe), lobe)
 
 
 def lobe_table(lobe: Lobe, n: int) -> Floats:
@@ -207,7 +201,7 @@ def lobe_table_at(lobe: Lobe, ring: Floats) -> Floats:
     tangent = np.tan(share * np.arctan(length))  # slope = tan(theta_h)
     scale = np.divide(tangent, length, out=np.zeros_like(length), where=length > 0)
     slopes = limit * scale[:, None] / [lobe.mx, lobe.my]
-    return table(slopes, np.ones(n), lobe, relative_density(slopes, lobe.distribution == "ggx"))
+    return table(slopes, np.ones(n), lobe, density(slopes, lobe))
 
 
 def polar(r: Any, phi_rad: Floats) -> Floats:
@@ -217,7 +211,7 @@ def polar(r: Any, phi_rad: Floats) -> Floats:
 
 def border(lobe: Lobe) -> Floats:
     """Slopes (2,) along t and b of the lobe's border, which leaves 1 % of the lobe outside (4.10)."""
-    return float(radius(1 - BORDER_MASS, lobe.distribution == "ggx")) * np.array([lobe.mx, lobe.my])
+    return float(slope_radius(1 - BORDER_MASS, lobe)) * np.array([lobe.mx, lobe.my])
 
 
 def automatic_n(material: Material, roughness: float = 1.0, without_lamps: bool = False) -> int:
@@ -225,7 +219,7 @@ def automatic_n(material: Material, roughness: float = 1.0, without_lamps: bool 
 
     Fewer suffice with `without_lamps`, for light that holds no lamps (docs/decisions/lamps-in-closed-form.md).
     """
-    m = roughness * max((max(lobe.mx, lobe.my) for lobe in material.lobes), default=0.0)
+    m = roughness * max((max(widths(lobe)) for lobe in material.lobes), default=0.0)
     steps = ((0.004, 1), (0.015, 3), (0.04, 5), (0.1, 7), (0.2, 11), (0.35, 15))
     n = next((n for limit, n in steps if m <= limit), 19)
     return min(n, 3 if n <= 11 else 5) if without_lamps else n

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.geometry.cubemap import directions_at
+from lambent.materials.document import Lobe
 from lambent.realtime.gpu.layouts import Layouts
 from lambent.realtime.gpu.pipelines import cover, screen_pipeline
 from lambent.realtime.gpu.structs import PREFILTER_DTYPE
 from lambent.realtime.gpu.targets import target_texture
 from lambent.realtime.integrators.albedo import LEVELS
-from lambent.realtime.integrators.patterns import lobe_points, relative_density
+from lambent.realtime.integrators.patterns import density, lobe_points
 
 FORMAT = "rgba16float"
 SAMPLES = 64
@@ -50,6 +51,7 @@ def prefiltered_cube(layouts: Layouts, source: Any, sampler: Any) -> Any:
 
 def _samples() -> NDArray[np.float32]:
     """(SAMPLES, 4): slopes in units of m, and half the log2 of 4 pi/(n density)."""
-    slopes = lobe_points(SAMPLES)
-    half_log2 = 0.5 * np.log2(4 * np.pi / (SAMPLES * relative_density(slopes)))
+    round_lobe = Lobe(mx=1.0, my=1.0)
+    slopes = lobe_points(SAMPLES, round_lobe)
+    half_log2 = 0.5 * np.log2(4 * np.pi / (SAMPLES * density(slopes, round_lobe)))
     return np.column_stack([slopes, half_log2, np.zeros(SAMPLES)]).astype(np.float32)

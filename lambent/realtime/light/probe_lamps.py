@@ -17,6 +17,7 @@ flux changes with |n.(p - x)|/e^3, like that of a flat emitter.
 
 from __future__ import annotations
 
+import math
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -28,6 +29,7 @@ from lambent.core.geometry.cubemap import texel_solid_angles
 from lambent.core.geometry.directions import normalize
 from lambent.core.light.colour import luminance
 from lambent.materials.document import Lobe, Material
+from lambent.materials.lobes import widths
 from lambent.realtime.gpu.cube_mips import finite, smooth_chain
 from lambent.realtime.incident import LookUp
 from lambent.realtime.light.baked import Probe
@@ -88,7 +90,7 @@ class ProbeLamps:
         return float(luminance(self.radiance.reshape(-1, 3)) @ omega) / (4 * np.pi)
 
     def _brightest_highlight(self, lobe: Lobe) -> float:
-        spread = self._power / (4 * np.pi * lobe.mx * lobe.my)
+        spread = self._power / (4 * np.pi * math.prod(widths(lobe)))
         brightest = float(np.minimum(spread, self._peak).max(initial=self._mean))
         tint = np.array(lobe.k) * (1.0 if lobe.side == "transmission" else np.array(lobe.r0))
         return float(luminance(tint)) * brightest
@@ -137,7 +139,7 @@ def group_of(radii: list[float]) -> NDArray[np.intp]:
 
 def groups_out(lobe: Lobe, radii: Floats) -> float:
     """Number of groups taken out for a lobe; a fraction is the share of the last group (groups_out of lamps.wgsl)."""
-    share = np.clip((np.sqrt(lobe.mx * lobe.my) / radii - FIRST) / (LAST - FIRST), 0, 1)
+    share = np.clip((math.sqrt(math.prod(widths(lobe))) / radii - FIRST) / (LAST - FIRST), 0, 1)
     return float(np.sum(share * share * (3 - 2 * share)))
 
 

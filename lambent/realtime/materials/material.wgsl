@@ -7,7 +7,7 @@ override TEXTURES: u32 = 0u;
 
 struct Material {
     kd: vec4f, // w: 1 where the diffuse reflection is coupled to Fresnel
-    kt_d: vec4f,
+    kt_d: vec4f, // w: first row of the curve of kd in `samples`, or 0
     diffuse_scale: vec4f, // w: cutoff of opacity, below which is a hole
     specular_scale: vec4f,
     lie: array<vec4f, 12>, // two rows of each texture's uv transform

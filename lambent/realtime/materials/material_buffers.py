@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from lambent.materials import shader_layout
 from lambent.materials.document import Lobe, Material
+from lambent.materials.slope_curve import curve_rows
 from lambent.realtime.gpu.layouts import Layouts
 from lambent.realtime.gpu.structs import MATERIAL_DTYPE, PLACED_LOBE_DTYPE, Record
 from lambent.realtime.integrators.albedo import roughness_level
@@ -37,9 +39,16 @@ class MaterialBuffers:
 
     def _new(self, material: Material, how: Integrator, n: int) -> Any:
         lobes = material.lobes if how.specular else ()
-        numbers = self._layouts.buffer("UNIFORM", material_data(material, self.textures))
-        tables = (self._layouts.buffer("STORAGE", data) for data in (lobe_data(lobes), sample_data(lobes, how, n)))
-        return self._layouts.group(self._layouts.material, numbers, *tables, *self._bound)
+        samples, (curves, of_lobes, of_kd) = sample_data(lobes, how, n), curve_rows(material)
+        first = len(samples)
+        rows = [(shape + first, fresnel + first if fresnel >= 0 else 0) for shape, fresnel in of_lobes]
+        numbers = material_data(material, self.textures)
+        numbers["kt_d"][0, 3] = of_kd + first if of_kd >= 0 else 0
+        tables = lobe_data(lobes, rows[: len(lobes)]), np.concatenate([samples, curves]).astype(np.float32)
+        buffers = (self._layouts.buffer("STORAGE", data) for data in tables)
+        return self._layouts.group(
+            self._layouts.material, self._layouts.buffer("UNIFORM", numbers), *buffers, *self._bound
+        )
 
 
 def material_data(material: Material, textures: BoundTextures) -> Record:
@@ -52,11 +61,11 @@ def material_data(material: Material, textures: BoundTextures) -> Record:
     return data
 
 
-def lobe_data(lobes: tuple[Lobe, ...]) -> Record:
-    """(max(1, L),) records of PLACED_LOBE_DTYPE; storage buffers cannot be empty."""
+def lobe_data(lobes: tuple[Lobe, ...], rows: Sequence[tuple[int, int]]) -> Record:
+    """(max(1, L),) records of PLACED_LOBE_DTYPE; storage buffers cannot be empty. `rows` as for `packed_lobes`."""
     data = np.zeros(max(1, len(lobes)), PLACED_LOBE_DTYPE)
     if lobes:
-        data["lobe"] = shader_layout.packed_lobes(lobes)
+        data["lobe"] = shader_layout.packed_lobes(lobes, rows)
         data["border"] = [border(lobe) for lobe in lobes]
         data["level"] = [roughness_level(lobe) for lobe in lobes]
     return data

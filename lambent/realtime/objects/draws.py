@@ -8,6 +8,7 @@ from typing import Any
 
 from lambent.materials.clear import clear_terms
 from lambent.materials.document import Material
+from lambent.materials.lobes import widths
 from lambent.realtime.frame_state import SHOW, FrameState
 from lambent.realtime.incident import LookUp, brings_light
 from lambent.realtime.integrators.integrators import INTEGRATORS, Cube, Integrator
@@ -71,7 +72,7 @@ class Draw:
     @property
     def blurs(self) -> bool:
         """Whether each of its lobes is wide enough to blur the view mirrored in it."""
-        narrowest = min((min(lobe.mx, lobe.my) for lobe in self.material.lobes), default=0.0)
+        narrowest = min((min(widths(lobe)) for lobe in self.material.lobes), default=0.0)
         return bool(self.integrator.lamps) and narrowest >= BLURS_M and not self.textures & BITS["roughness"]
 
     @property
@@ -103,6 +104,7 @@ class Draw:
             "SAMPLES": self.n,
             "LOBES": self.lobes,
             "TEXTURES": self.textures,
+            **({"LAMBENT_CURVES": 1} if self.material.version > 1 else {}),
             **self.look_up.constants(self.item.light.device, self.item.light.probe),
             **self._change,
             **self.integrator.constants,

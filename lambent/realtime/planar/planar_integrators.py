@@ -11,6 +11,7 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.discovery import known
 from lambent.materials.document import Lobe
+from lambent.materials.lobes import slope_radius
 from lambent.realtime.integrators import patterns
 from lambent.realtime.integrators.integrators import Integrator
 
@@ -28,14 +29,13 @@ def interleaved_table(lobe: Lobe, n: int) -> Floats:
     Spiral o is r_k = sqrt(-ln(1 - (k + a)/n)), phi_k = 2 pi (.618034 k + beta), with a = (o + 1/2)/64 and
     beta = fract(TURN o). All 64 together cover the lobe's mass evenly, as does every fourth of them.
     """
-    ggx = lobe.distribution == "ggx"
     rows = patterns.rings_table(lobe, n)
     rows[:, 2] += 0.5 * np.log2(FIXED_BIAS / patterns.ring_bias(n))
     k, blocks = np.arange(n), [rows]
     for o in range(TILE):
-        r = patterns.radius((k + (o + 0.5) / TILE) / n, ggx)
+        r = slope_radius((k + (o + 0.5) / TILE) / n, lobe)
         slopes = patterns.polar(r, 2 * np.pi * (0.618034 * k + TURN * o % 1))
-        blocks.append(patterns.table(slopes, INTERLEAVED_BIAS / patterns.relative_density(slopes, ggx), lobe))
+        blocks.append(patterns.table(slopes, INTERLEAVED_BIAS / patterns.density(slopes, lobe), lobe))
     return np.concatenate(blocks)
 
 

@@ -2,6 +2,7 @@
 // shader of the look-up in use (lambent/realtime/incident), which may replace incident_light.wgsl.
 
 #include "lobes.wgsl"
+#include "scattering.wgsl"
 #include "colour.wgsl"
 #include "incident.wgsl"
 #include "look_up.wgsl"
@@ -28,10 +29,14 @@ struct Object {
 }
 
 @group(1) @binding(1) var<storage, read> lobes: array<PlacedLobe>;
-@group(1) @binding(2) var<storage, read> samples: array<vec4f>; // see patterns.py
+@group(1) @binding(2) var<storage, read> samples: array<vec4f>; // see patterns.py; then rows of curves
 
 @group(2) @binding(0) var<uniform> object: Object;
 @group(2) @binding(1) var radiance_cube: texture_cube<f32>;
+
+fn lambent_row(i: u32) -> vec4f {
+    return samples[i];
+}
 
 // A place on the light map: its coordinates, and their gradients, 1/m, along the surface.
 struct OnMap {
@@ -140,11 +145,13 @@ fn gain(lobe: LambentLobe, wi: vec3f, wo: vec3f, h: vec3f) -> vec3f {
     return lambent_tint(dot(wo, h), lobe) * (wi.z / (lambent_cosine_power(wi, wo, lobe) * h.z));
 }
 
-// Diffuse light towards cos_o from the irradiance on this side and on the other (4.1). A coupled kd is kd t(cos_o)
-// times the mean of (21/20) t(cos_i) over the light; this mean is 1 under uniform light, and is assumed 1 for all
-// light.
+// Diffuse light towards cos_o from the irradiance on this side and on the other (4.1). A kd that depends on both
+// directions is kd t(cos_o) times a mean over the light, which is 1 under uniform light, and is assumed 1 for all light.
 fn diffuse_light(cos_o: f32, e_here: vec3f, e_beyond: vec3f, painted: Painted) -> vec3f {
-    let seen = select(1.0, lambent_under_fresnel(cos_o), material.kd.w > 0.5);
+    var seen = select(1.0, lambent_under_fresnel(cos_o), material.kd.w > 0.5);
+    if LAMBENT_CURVES && material.kt_d.w > 0.0 {
+        seen = lambent_at_cosine(u32(material.kt_d.w), cos_o).x;
+    }
     return painted.diffuse * (material.kd.rgb * seen * e_here + material.kt_d.rgb * e_beyond) / LAMBENT_PI;
 }
 

@@ -24,6 +24,7 @@ from lambent.core.views.camera import Camera, CameraPath
 from lambent.materials.document import Lobe, Material, Provenance
 from lambent.materials.factored.of_models import editable
 from lambent.materials.models.phong import Phong
+from lambent.materials.slope_curve import NODES_RHO
 from lambent.scenes.geometry import patch, placed, sphere
 from lambent.scenes.grids import Grid
 from lambent.scenes.looks.textures import CHANNELS
@@ -99,12 +100,16 @@ MATERIAL: Answers = {
     "provenance": (Provenance(source="other.brdf"), NOTHING),
     "kd": ((0.1, 0.2, 0.31), (*LIT, BOUNCED)),
     "kd_coupled": (True, (*LIT, *of_terms("sheet/0/"), BOUNCED)),
+    "kd_curve": (lambda _: (1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.9), (*LIT, BOUNCED)),
     "kt_d": ((0.1, 0.1, 0.2), (*LIT, BOUNCED)),
     "lobes": (lambda lobes: lobes * 2, (*LIT, *of_terms("sheet/3/"), BOUNCED)),
 }
+CURVE = tuple((1 + NODES_RHO**2) ** -3.0)
 LOBE: Answers = {
     "side": ("transmission", (*LIT, *of_terms("sheet/2/"), BOUNCED)),
     "distribution": ("ggx", (*LIT, BOUNCED)),
+    "shape": (CURVE, (*LIT, BOUNCED)),
+    "fresnel": (((0.9,) * 8,) * 3, (*LIT, BOUNCED)),
     "k": ((0.9, 1.0, 1.0), (*LIT, BOUNCED)),
     "mx": (0.02, (*LIT, *of_terms("sheet/2/", "sheet/3/"), BOUNCED)),
     "my": (0.02, (*LIT, *of_terms("sheet/2/", "sheet/3/"), BOUNCED)),
@@ -275,7 +280,10 @@ SETTINGS: dict[str, dict[str, tuple[object, tuple[str, ...]]]] = {
 def changed(one: Any, field: str, value: Any) -> Any:
     """A dataclass or document with another value, or with a function of the one that it has."""
     value = value(getattr(one, field)) if callable(value) else value
-    return replace(one, **{field: value}) if is_dataclass(one) else type(one)(**{**dict(one), field: value})
+    if is_dataclass(one):
+        return replace(one, **{field: value})
+    own = {"distribution": "curve"} if field == "shape" else {}  # which alone has a shape
+    return type(one)(**{**dict(one), **own, field: value})
 
 
 def with_floor(scene: Scene, floor: SceneObject) -> Scene:

@@ -9,6 +9,7 @@ import pytest
 from scipy.special import erfinv
 
 from lambent.materials.document import Lobe
+from lambent.materials.slope_curve import NODES_RHO
 from lambent.realtime.integrators import patterns
 
 NS = (3, 5, 7, 9, 11, 13, 15, 17, 19, 40)
@@ -21,13 +22,19 @@ def test_ring_counts_add_up(n: int) -> None:
     assert min(counts) >= 1
 
 
-@pytest.mark.parametrize("ggx", [False, True])
+BECKMANN, GGX = (Lobe(mx=1.0, my=1.0, distribution=name) for name in ("beckmann", "ggx"))
+GGX_CURVE = Lobe(  # the nodes of GGX, which a curve contains
+    mx=1.0, my=1.0, distribution="curve", shape=tuple(((1 + NODES_RHO**2) ** -2.0).tolist())
+)
+
+
+@pytest.mark.parametrize("lobe", [BECKMANN, GGX, GGX_CURVE])
 @pytest.mark.parametrize("n", range(1, patterns.N_MAX + 1))
-def test_half_of_each_rings_mass_lies_inside_its_radius(n: int, ggx: bool) -> None:
-    pattern = patterns.ring_pattern(n, ggx)
+def test_half_of_each_rings_mass_lies_inside_its_radius(n: int, lobe: Lobe) -> None:
+    pattern = patterns.ring_pattern(n, lobe)
     assert pattern.weight.mean() == pytest.approx(1)
     r = np.linalg.norm(pattern.slopes, axis=-1) / patterns.ring_stretch(n)
-    inside = r**2 / (1 + r**2) if ggx else 1 - np.exp(-(r**2))
+    inside = r**2 / (1 + r**2) if lobe is not BECKMANN else 1 - np.exp(-(r**2))
     before, first = 0.0, 0
     for count in patterns.ring_counts(n):
         mass = pattern.weight[first : first + count].sum() / n
@@ -38,7 +45,7 @@ def test_half_of_each_rings_mass_lies_inside_its_radius(n: int, ggx: bool) -> No
 
 @pytest.mark.parametrize("n", NS)
 def test_rings_are_balanced(n: int) -> None:
-    pattern = patterns.ring_pattern(n)
+    pattern = patterns.ring_pattern(n, BECKMANN)
     np.testing.assert_allclose(pattern.weight @ pattern.slopes, 0, atol=1e-12)
     covariance = (pattern.slopes.T * pattern.weight) @ pattern.slopes / n  # a Beckmann slope: m^2/2 per axis
     if n != 9:  # the inner ring of two is not round
@@ -48,7 +55,7 @@ def test_rings_are_balanced(n: int) -> None:
 
 @pytest.mark.parametrize("n", [11, 15, 19])
 def test_a_line_of_weighted_samples_integrates_over_the_marginal(n: int) -> None:
-    pattern = patterns.line_pattern(n)
+    pattern = patterns.line_pattern(n, BECKMANN)
     x, w = pattern.slopes[:, 0], pattern.weight / n
     for frequency in (0.5, 1.0, 2.0, 3.0):  # the mean of cos(f x) over exp(-x^2) is exp(-f^2/4)
         weighted = abs(w @ np.cos(frequency * x) - np.exp(-(frequency**2) / 4))
@@ -59,12 +66,16 @@ def test_a_line_of_weighted_samples_integrates_over_the_marginal(n: int) -> None
     np.testing.assert_allclose(x, -x[::-1], atol=1e-12)
 
 
-def test_a_ggx_line_is_the_quantile_of_the_marginal() -> None:
-    rng = np.random.default_rng(0)
-    u1, u2 = rng.random((2, 200_000))
-    marginal = patterns.radius(u1, True) * np.cos(2 * np.pi * u2)
-    quantiles = np.quantile(marginal, (np.arange(7) + 0.5) / 7)
-    np.testing.assert_allclose(patterns.line_pattern(7, True).slopes[:, 0], quantiles, atol=0.03)
+@pytest.mark.parametrize("lobe", [GGX, GGX_CURVE])
+def test_a_ggx_line_is_the_quantile_of_the_marginal(lobe: Lobe) -> None:
+    """The marginal of GGX is (1 + x^2)^(-3/2) / 2, with the quantiles t / sqrt(1 - t^2)."""
+    t = (2 * np.arange(7) + 1) / 7 - 1
+    np.testing.assert_allclose(patterns.line_pattern(7, lobe).slopes[:, 0], t / np.sqrt(1 - t * t), atol=0.01)
+
+
+def test_a_curve_of_ggx_has_its_samples() -> None:
+    for n in NS:
+        np.testing.assert_allclose(patterns.rings_table(GGX_CURVE, n), patterns.rings_table(GGX, n), atol=2e-6)
 
 
 @pytest.mark.parametrize("table", [patterns.rings_table, patterns.lobe_table])
@@ -102,5 +113,5 @@ def test_fis_filters_share_out_the_sphere_of_slopes() -> None:
     """c = 4 pi mx my/(n D): the solid angle of a sample is 1/(n pdf)."""
     lobe = Lobe(mx=0.3, my=0.1)
     rows = patterns.fis_table(lobe, 16)
-    density = patterns.relative_density(rows[:, :2] / [lobe.mx, lobe.my])
+    density = patterns.density(rows[:, :2] / [lobe.mx, lobe.my], lobe)
     np.testing.assert_allclose(4.0 ** rows[:, 2] * density, 4 * np.pi * 0.03 / 16, rtol=1e-5)

@@ -13,9 +13,10 @@ from lambent.baked.probes.irradiance import basis_of
 from lambent.core.geometry.directions import normalize, reflect
 from lambent.core.light.colour import luminance
 from lambent.core.views.camera import Camera, pixel_rays
-from lambent.materials.bsdf import under_fresnel
+from lambent.materials.bsdf import diffuse_seen
 from lambent.materials.document import Lobe, Material
 from lambent.materials.shader_layout import lobe_shader
+from lambent.materials.slope_curve import curve_rows
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.gpu.shader_source import assemble
 from lambent.realtime.light.baked import Probe
@@ -142,19 +143,25 @@ def test_widths_of_a_lobe_about_its_mirror_direction() -> None:
         np.testing.assert_allclose(found, expected, rtol=1e-4)
 
 
-@pytest.mark.parametrize("coupled", [0.0, 1.0])
-def test_diffuse_light_of_both_sides(coupled: float) -> None:
-    """(kd E of this side, with t(cos_o) where it is coupled, + kt_d E of the other)/pi."""
+@pytest.mark.parametrize("kind", [{}, {"kd_coupled": True}, {"kd_curve": (0.3, 1.4, 1.2, 1.0, 0.9, 1.1, 1.0, 0.8)}])
+def test_diffuse_light_of_both_sides(kind: dict[str, Any]) -> None:
+    """(kd E of this side, times what is seen of it towards cos_o, + kt_d E of the other)/pi."""
+    material = Material(kd=(0.2, 0.4, 0.6), kt_d=(0.3, 0.1, 0.05), **kind)
+    rows, _, of_kd = curve_rows(material)
     cos_o = np.linspace(0.1, 1, 50)
     here, beyond = RNG.uniform(0, 3, (2, 50, 3))
     declared = f"""struct Material {{ kd: vec4f, kt_d: vec4f }}
-const material = Material(vec4f(0.2, 0.4, 0.6, {coupled}), vec4f(0.3, 0.1, 0.05, 0.0));
+const material = Material(vec4f(0.2, 0.4, 0.6, {float(material.kd_coupled)}), vec4f(0.3, 0.1, 0.05, {of_kd + 1.0}));
 struct Painted {{ diffuse: vec3f }}
+fn lambent_row(i: u32) -> vec4f {{ return rows[i]; }}
 """
-    source = lobe_shader() + part("surface.wgsl", "fn", "diffuse_light")
+    tables = {"rows": np.concatenate([np.zeros((1, 4)), rows])}
+    curved = assemble("lobes.wgsl", "scattering.wgsl").replace("CURVES: bool = false", "CURVES: bool = true")
+    source = curved + part("surface.wgsl", "fn", "diffuse_light")
     call = "diffuse_light(c, here, beyond, Painted(vec3f(1.0, 0.5, 2.0)))"
-    found = run_wgsl(source, call, {"c": cos_o, "here": here, "beyond": beyond}, components=3, declarations=declared)
-    share = under_fresnel(cos_o)[:, None] if coupled else 1.0
+    inputs = {"c": cos_o, "here": here, "beyond": beyond}
+    found = run_wgsl(source, call, inputs, components=3, declarations=declared, tables=tables)
+    share = diffuse_seen(cos_o, material)[:, None]
     light = np.array([0.2, 0.4, 0.6]) * share * here + np.array([0.3, 0.1, 0.05]) * beyond
     np.testing.assert_allclose(found, light * (1.0, 0.5, 2.0) / np.pi, rtol=1e-4)
 

@@ -98,6 +98,7 @@ def _beckmann_lambda(slope2: Floats) -> Floats:
 def is_grey(material: Material) -> bool:
     """Whether all coefficients are equal in the three channels."""
     triples = [material.kd, material.kt_d, *(rgb for lobe in material.lobes for rgb in (lobe.k, lobe.r0))]
+    triples += [rgb for lobe in material.lobes for rgb in zip(*(lobe.fresnel or ()), strict=True)]
     return all(len(set(rgb)) == 1 for rgb in triples)
 
 

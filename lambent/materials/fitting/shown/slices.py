@@ -6,7 +6,7 @@ parameters; a valley, that it determines only a combination of them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -61,7 +61,8 @@ def slices(
     """The slices of lobe `index` of `material`: over (mx, my) and (r0, alpha).
 
     An isotropic table has one azimuth of wi and cannot distinguish mx from my: both vary together, and (m, alpha)
-    replaces (mx, my). For retro and transmission lobes r0 cannot be separated from k, so a roughness replaces r0.
+    replaces (mx, my). Where r0 cannot be separated from k (retro and transmission lobes) or is a curve, a roughness
+    replaces r0.
     """
     lobe = material.lobes[index]
     problem, rest = _prepared(samples, material, index, metric)
@@ -73,7 +74,7 @@ def _planes(lobe: Lobe, tied: bool) -> list[tuple[str, str]]:
     """Pairs of parameters; m is mx and my at once."""
     roughness = "m" if tied else "mx"
     planes = [("m", "alpha") if tied else ("mx", "my")]
-    last = ("r0" if lobe.mirrors else roughness, "alpha")
+    last = ("r0" if lobe.mirrors and lobe.fresnel is None else roughness, "alpha")
     return planes if last in planes else [*planes, last]
 
 
@@ -97,9 +98,7 @@ def _prepared(samples: MeasuredSamples, material: Material, index: int, metric: 
     rest = diffuse[:, None] * problem.diffuse
     for number, other in enumerate(material.lobes):
         if number != index and other.side == lobe.side:
-            shape = np.array([other.mx, other.my, float(np.mean(other.r0)), other.alpha])
-            basis = replace(problem, distribution=other.distribution).basis(shape, other.retro)
-            rest = rest + np.array(other.k)[:channels, None] * basis
+            rest = rest + np.array(other.k)[:channels, None] * problem.of(other)
     return problem, rest
 
 
@@ -110,18 +109,19 @@ def _slice(problem: Problem, rest: Floats, lobe: Lobe, plane: tuple[str, str], s
     error = np.empty((len(y), len(x)))
     for row in tracked(range(len(y)), progress, f"error over {across} and {down}"):
         value = y[row]
-        basis = np.stack(
-            [problem.basis(_shape(own | {down: float(value), across: float(v)}, plane), lobe.retro) for v in x]
-        )
+        basis = np.stack([problem.of(_changed(lobe, {down: float(value), across: float(v)})) for v in x], axis=1)
         totals = np.zeros(len(x))
-        for measured, background in zip(problem.measured, rest, strict=True):
+        for measured, background, of_channel in zip(problem.measured, rest, basis, strict=True):
             channel = Channel(measured, background, problem.w, problem.c)
-            totals += solve_scale(problem.metric, channel, basis, steps=SOLVER_STEPS)[1]
+            totals += solve_scale(problem.metric, channel, of_channel, steps=SOLVER_STEPS)[1]
         error[row] = (totals / len(rest)) ** (1 / problem.metric.power)
     return Slice(across, down, x, y, error, (own[across], own[down]))
 
 
-def _shape(values: dict[str, float], plane: tuple[str, str]) -> Floats:
-    """mx, my, r0, alpha of the named values; m is both roughnesses."""
-    mx, my = (values["m"], values["m"]) if "m" in plane else (values["mx"], values["my"])
-    return np.array([mx, my, values["r0"], values["alpha"]])
+def _changed(lobe: Lobe, values: dict[str, float]) -> Lobe:
+    """The lobe with the named numbers; m is both roughnesses, r0 that of all channels."""
+    numbers = {name: values[name] for name in ("mx", "my", "alpha") if name in values}
+    if "m" in values:
+        numbers |= {"mx": values["m"], "my": values["m"]}
+    r0 = {"r0": (values["r0"],) * 3} if "r0" in values else {}
+    return lobe.model_copy(update=numbers | r0)

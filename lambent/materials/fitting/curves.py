@@ -1,0 +1,337 @@
+"""Fit one lobe whose density of slopes and Fresnel reflectance are curves, from the best lobe of a given shape.
+
+The unknowns are ln P at the nodes of `slope_curve`, ln of k F at the nodes of cos_d in each channel, alpha, ln(my/mx)
+of an anisotropic table, ln of the diffuse coefficients and, if wanted, ln of the nodes of the diffuse curve. In these
+the model is smooth and its derivatives are hat functions: damped Gauss-Newton as in `gradient`.
+
+Nodes without tuples, and noise, are held by a penalty on the second differences of a curve between neighbours. Its
+strength is the one of STRENGTHS that predicts tuples best which the fit has not seen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.core.arrays import Flags, Floats
+from lambent.core.plain import triple
+from lambent.core.progress import Progress
+from lambent.materials.document import COSINE_NODES, SHAPE_NODES, Lobe, Side
+from lambent.materials.fitting.gradient import DAMPING, damped_step, reweighted
+from lambent.materials.fitting.parameters import Box
+from lambent.materials.fitting.problem import ALPHA, Mixture, Problem
+from lambent.materials.fresnel import schlick_weight
+from lambent.materials.lobes import NUMPY
+from lambent.materials.slope_curve import NODES_LOG, NODES_RHO, ROW, normalised, quantile, slope_table
+
+STRENGTHS = (1e-6, 1e-4, 1e-2)  # of the penalty, in units of the start's error
+FOLDS = 5  # a fifth of the tuples is held out
+CURVE_VALUES = (30_000, 240_000)  # measured values (tuples times channels) of the trials and of the final fit
+CURVE_STEPS = (25, 15)
+KD_GAIN = 0.02  # share of E that a curve of the diffuse term must remove
+DARKEST = -30.0  # least ln of the start's density
+DARK = 1e-5  # a smaller diffuse coefficient counts as 0
+STRETCH = 5.0  # most of ln(my/mx)
+
+
+@dataclass(frozen=True)
+class CurveModel:
+    """A side's model with one curve lobe.
+
+    Attributes
+    ----------
+    m : float
+        Geometric mean of mx and my: the unit of the curve's radius.
+    shape : (SHAPE_NODES,)
+        ln of the density of slopes, not normalised.
+    tint : (C, COSINE_NODES)
+        ln of k F (reflection) or k (1 - F) (transmission).
+    bent : (2,)
+        alpha and ln(my/mx).
+    diffuse : (C,)
+        ln of kd or kt_d.
+    kd_curve : (COSINE_NODES,)
+        ln of the diffuse curve.
+    """
+
+    m: float
+    shape: Floats
+    tint: Floats
+    bent: Floats
+    diffuse: Floats
+    kd_curve: Floats
+
+    @property
+    def vector(self) -> Floats:
+        return np.concatenate([self.shape, self.tint.ravel(), self.bent, self.diffuse, self.kd_curve])
+
+    def at(self, x: Floats) -> CurveModel:
+        """The model with these unknowns."""
+        ends = np.cumsum([self.shape.size, self.tint.size, self.bent.size, self.diffuse.size])
+        shape, tint, bent, diffuse, kd_curve = np.split(x, ends)
+        return replace(
+            self, shape=shape, tint=tint.reshape(self.tint.shape), bent=bent, diffuse=diffuse, kd_curve=kd_curve
+        )
+
+
+@dataclass(frozen=True)
+class CurveFit:
+    """A side fitted by a curve lobe: the document's lobe and diffuse terms, and errors on tuples that were held out.
+
+    Attributes
+    ----------
+    diffuse : (C,)
+        kd or kt_d.
+    kd_curve : tuple of float or None
+    held_out, lobes_held_out : float
+        E of the curve lobe's model and of the lobes' on these tuples.
+    """
+
+    lobe: Lobe
+    diffuse: Floats
+    kd_curve: tuple[float, ...] | None
+    held_out: float
+    lobes_held_out: float
+
+
+def _hats(place: Floats, nodes: Floats) -> tuple[NDArray[np.int64], Floats]:
+    """Lower node (N,) and share (N,) of the upper one, linear between `nodes` and beyond."""
+    low = np.clip(np.searchsorted(nodes, place, side="right") - 1, 0, len(nodes) - 2)
+    return low, (place - nodes[low]) / (nodes[low + 1] - nodes[low])
+
+
+COSINES = np.linspace(0, 1, COSINE_NODES)
+
+
+class Terms:
+    """The terms of a model at a block of tuples, with their derivatives by the unknowns."""
+
+    def __init__(self, block: Problem, model: CurveModel, background: Floats) -> None:
+        alpha, stretch = model.bent
+        mx, my = model.m * np.exp(-stretch / 2), model.m * np.exp(stretch / 2)
+        x, y = block.slope_x2[0] / (mx * mx), block.slope_y2[0] / (my * my)
+        self._slope2, self._difference = x + y, x - y
+        self._hats = [_hats(np.log1p(x + y), NODES_LOG), _hats(block.cos_d[0], COSINES)]
+        self._of_diffuse = [_hats(cosine, COSINES) for cosine in block.cosines]
+        self._block, self._model, self.background = block, model, background
+        log_p = _at(model.shape, self._hats[0]) + block.base[0] - 2 * np.log(model.m) - alpha * block.log_cosines
+        self.lobe = np.exp(log_p + _at(model.tint, self._hats[1]))  # (C, N)
+        curve = sum(_at(model.kd_curve, hats) for hats in self._of_diffuse)
+        self.diffuse = np.exp(model.diffuse[:, None] + curve) * block.diffuse
+
+    @property
+    def f(self) -> Floats:
+        """(C, N) f in 1/sr."""
+        return np.asarray(self.lobe + self.diffuse + self.background)
+
+    def rows(self, channel: int) -> Floats:
+        """(U, N) derivatives of a channel's f by all unknowns."""
+        model, n = self._model, len(self._slope2)
+        rows = np.zeros((model.vector.size, n))
+        lobe, diffuse, channels = self.lobe[channel], self.diffuse[channel], len(model.diffuse)
+        _scatter(rows, 0, self._hats[0], lobe)
+        first = SHAPE_NODES
+        _scatter(rows, first + channel * COSINE_NODES, self._hats[1], lobe)
+        first += channels * COSINE_NODES
+        low, _ = self._hats[0]
+        power = np.diff(model.shape)[low] / np.diff(NODES_LOG)[low]
+        rows[first] = -self._block.log_cosines * lobe
+        rows[first + 1] = power / (1 + self._slope2) * self._difference * lobe
+        rows[first + 2 + channel] = diffuse
+        for hats in self._of_diffuse:
+            _scatter(rows, first + 2 + channels, hats, diffuse)
+        return rows
+
+
+def _at(values: Floats, hats: tuple[NDArray[np.int64], Floats]) -> Floats:
+    """(..., N) values at nodes (..., K), interpolated."""
+    low, share = hats
+    return np.asarray(values[..., low] * (1 - share) + values[..., low + 1] * share)
+
+
+def _scatter(rows: Floats, first: int, hats: tuple[NDArray[np.int64], Floats], term: Floats) -> None:
+    """Add the derivatives of a term by the nodes from row `first` on."""
+    low, share = hats
+    at = np.arange(len(low))
+    rows[first + low, at] += (1 - share) * term
+    rows[first + 1 + low, at] += share * term
+
+
+@dataclass(frozen=True)
+class _Descent:
+    """Least squares of one problem from a model; `free` (U,) are the unknowns that move, `strength` the penalty's."""
+
+    problem: Problem
+    others: Mixture  # lobes that stay as they are
+    free: Flags
+    limits: tuple[Floats, Floats]
+    strength: float
+
+    def error(self, model: CurveModel) -> float:
+        """The metric's sum, averaged over channels."""
+        total = 0.0
+        for block in self.problem.blocks:
+            f = Terms(block, model, self._background(block)).f
+            gap = np.abs(block.target - block.metric.transform(block.c * f))
+            total += float(np.mean(gap**block.metric.power @ block.w))
+        return total
+
+    def _background(self, block: Problem) -> Floats:
+        return block.evaluate(replace(self.others, diffuse=np.zeros(len(block.measured))))
+
+    def _penalty(self, model: CurveModel) -> Floats:
+        """(R, U) second differences of the curves, by the unknowns."""
+        channels, count = len(model.diffuse), model.vector.size
+        starts = [(0, SHAPE_NODES), *((SHAPE_NODES + c * COSINE_NODES, COSINE_NODES) for c in range(channels))]
+        starts.append((count - COSINE_NODES, COSINE_NODES))
+        rows = [
+            np.eye(count)[first + i - 1] - 2 * np.eye(count)[first + i] + np.eye(count)[first + i + 1]
+            for first, nodes in starts
+            for i in range(1, nodes - 1)
+        ]
+        return np.stack(rows)
+
+    def _equations(self, model: CurveModel) -> tuple[Floats, Floats]:
+        count = model.vector.size
+        matrix, gradient = np.zeros((count, count)), np.zeros(count)
+        for block in self.problem.blocks:
+            terms = Terms(block, model, self._background(block))
+            for channel, target in enumerate(block.target):
+                value = block.c * terms.f[channel]
+                residual = target - block.metric.transform(value)
+                w = reweighted(block, target, residual)
+                rows = terms.rows(channel) * (block.c * block.metric.slope(value))
+                matrix += (rows * w) @ rows.T
+                gradient += (rows * w) @ residual
+        return matrix / len(model.diffuse), gradient / len(model.diffuse)
+
+    def run(self, model: CurveModel, steps: int) -> CurveModel:
+        """The model after at most `steps` steps."""
+        bends = self._penalty(model)
+        error = self.error(model)
+        weight = self.strength * error
+
+        def total(one: CurveModel, error: float) -> float:
+            return error + weight * float(np.sum((bends @ one.vector) ** 2))
+
+        now, damping, free = total(model, error), DAMPING[0], np.flatnonzero(self.free)
+        for _ in range(steps):
+            matrix, gradient = self._equations(model)
+            matrix, gradient = matrix + weight * bends.T @ bends, gradient - weight * bends.T @ (bends @ model.vector)
+            before, x = now, model.vector
+            while damping < DAMPING[1]:
+                there = x.copy()
+                there[free] = damped_step(
+                    matrix[np.ix_(free, free)], gradient[free], damping, x[free], *(one[free] for one in self.limits)
+                )
+                candidate = model.at(there)
+                reached = total(candidate, self.error(candidate))
+                if reached < now:
+                    model, now, damping = candidate, reached, max(damping / 10, 1e-9)
+                    break
+                damping *= 10
+            if before - now <= 1e-4 * before:
+                break
+        return model
+
+
+def start_of(problem: Problem, mixture: Mixture) -> CurveModel:
+    """The model of a mixture's first mirroring lobe in the form of curves."""
+    lobe = next(one for one in mixture.lobes if not one.retro)
+    mx, my, r0, alpha = (float(v) for v in lobe.shape)
+    shape = -2 * NODES_LOG if problem.distribution == "ggx" else np.maximum(-(NODES_RHO**2), DARKEST)
+    f = r0 + (1 - r0) * schlick_weight(COSINES)
+    f = f if problem.side == "reflection" else 1 - f
+    tint = np.log(np.maximum(lobe.k, 1e-9))[:, None] + np.log(np.maximum(f, 1e-6))
+    bent = np.array([alpha, np.log(my / mx)])
+    diffuse = np.log(np.maximum(mixture.diffuse, 1e-9))
+    return CurveModel(float(np.sqrt(mx * my)), shape, tint, bent, diffuse, np.zeros(COSINE_NODES))
+
+
+def regauged(model: CurveModel) -> CurveModel:
+    """The same lobe with the unit of slopes that puts half of it inside the radius of Beckmann's half."""
+    half = float(quantile(np.array(0.5), _relative(model.shape), NUMPY))
+    scale = half / np.sqrt(np.log(2))
+    shape = _at(model.shape, _hats(np.log1p((NODES_RHO * scale) ** 2), NODES_LOG))
+    return replace(model, m=model.m * scale, shape=shape + 2 * np.log(scale))
+
+
+def _relative(log_shape: Floats) -> tuple[float, ...]:
+    return tuple(np.exp(np.maximum(log_shape - log_shape.max(), -69.0)).tolist())
+
+
+def lobe_of(model: CurveModel, side: Side) -> Lobe:
+    """The model's lobe in the form of a document."""
+    alpha, stretch = (float(v) for v in model.bent)
+    relative = _relative(model.shape)
+    mass = np.exp(model.shape.max() - slope_table(relative)[::ROW].max())  # twice the integral of P rho
+    tint = np.broadcast_to(mass * np.exp(model.tint), (3, COSINE_NODES))
+    k = tint.max(axis=1)
+    share = np.minimum(tint / k[:, None], 1.0)
+    red, green, blue = (share if side == "reflection" else 1 - share).tolist()
+    mx, my = (float(np.clip(model.m * np.exp(turn * stretch / 2), 0.001, 4)) for turn in (-1, 1))
+    return Lobe(
+        side=side, distribution="curve", k=triple(k), mx=mx, my=my, alpha=alpha, shape=relative,
+        fresnel=(tuple(red), tuple(green), tuple(blue)),
+    )  # fmt: skip
+
+
+def fit_curve(
+    problem: Problem, mixture: Mixture, box: Box, diffuse_free: bool, seed: int, progress: Progress,
+    compared: Mixture,
+) -> CurveFit:  # fmt: skip
+    """The best curve lobe from a mixture's first mirroring lobe; its retro lobe stays.
+
+    Parameters
+    ----------
+    box : Box
+        Of that lobe: ends of alpha; whether mx and my are one number.
+    compared : Mixture
+        Lobes whose error on the tuples held out is stated beside the curve lobe's.
+    """
+    channels = len(problem.measured)
+    others = replace(mixture, lobes=tuple(one for one in mixture.lobes if one.retro))
+    trial, final = problem.thinned([values // channels for values in CURVE_VALUES], seed, (np.float64,) * 2)
+    is_held = np.random.default_rng(seed).permutation(len(trial)) % FOLDS == 0
+    seen, unseen = (trial.take(np.flatnonzero(part), trial.w[part], np.float64) for part in (~is_held, is_held))
+    start = start_of(problem, mixture)
+
+    def tried(strength: float, bends_kd: bool) -> tuple[float, float, bool, CurveModel]:
+        progress(len(tries), len(STRENGTHS) + 2, f"curve lobe, {len(seen)} tuples")
+        descent = _Descent(seen, others, *_bounds(start, box, diffuse_free, bends_kd), strength)
+        model = descent.run(regauged(descent.run(start, CURVE_STEPS[0])), CURVE_STEPS[1])
+        return replace(descent, problem=unseen).error(model), strength, bends_kd, model
+
+    tries: list[tuple[float, float, bool, CurveModel]] = []
+    for strength in STRENGTHS:
+        tries.append(tried(strength, False))
+    best = min(tries, key=lambda one: one[0])
+    power = 1 / problem.metric.power
+    if diffuse_free and np.any(mixture.diffuse > DARK):
+        bent = tried(best[1], True)
+        best = bent if bent[0] ** power < (1 - KD_GAIN) * best[0] ** power else best
+    progress(len(STRENGTHS) + 1, len(STRENGTHS) + 2, f"curve lobe, {len(final)} tuples")
+    free, limits = _bounds(best[3], box, diffuse_free, best[2])
+    model = _Descent(final, others, free, limits, best[1]).run(best[3], CURVE_STEPS[1])
+    curve = np.exp(model.kd_curve - model.kd_curve.max())
+    scale = np.exp(2 * (model.kd_curve - np.log(normalised(tuple(np.exp(model.kd_curve).tolist())))))[0]
+    return CurveFit(
+        lobe_of(model, problem.side),
+        np.exp(model.diffuse) * scale if diffuse_free else mixture.diffuse,
+        tuple(curve.tolist()) if best[2] else None,
+        (best[0] * FOLDS) ** power,
+        (unseen.remaining(compared) * FOLDS) ** power,
+    )
+
+
+def _bounds(model: CurveModel, box: Box, diffuse_free: bool, bends_kd: bool) -> tuple[Flags, tuple[Floats, Floats]]:
+    """Which unknowns are free, and their intervals."""
+    bent = np.array([box.lo[ALPHA] < box.hi[ALPHA], not box.tied])
+    of_kd = np.full(len(model.diffuse), diffuse_free)
+    free = np.concatenate([np.ones(SHAPE_NODES + model.tint.size, bool), bent, of_kd, np.full(COSINE_NODES, bends_kd)])
+    bound = np.full(model.vector.size, np.inf)
+    lo, hi = model.at(-bound), model.at(bound)
+    lo.bent[:], hi.bent[:] = (box.lo[ALPHA], -STRETCH), (box.hi[ALPHA], STRETCH)
+    return free, (lo.vector, hi.vector)
