@@ -28,7 +28,8 @@ from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
 from lambent.materials.fitting import gradient
 from lambent.materials.fitting.account import lambertian_errors
-from lambent.materials.fitting.fit import FitResult, Search, fit
+from lambent.materials.fitting.fit import Search, fit
+from lambent.materials.fitting.result import FitResult
 from lambent.materials.measured.inspecting.metrics import errors_of
 from lambent.materials.measured.inspecting.synthetic import synthesise
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable

@@ -16,7 +16,7 @@ from lambent.core.pictures.images import to_bytes
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.materials.fitting.account import PEAK_SHARE, evaluate, peak_share
-from lambent.materials.fitting.fit import FitResult
+from lambent.materials.fitting.result import FitResult
 from lambent.materials.fitting.shown import plot
 from lambent.materials.fitting.shown.incidence import Incidence, incidences
 from lambent.materials.fitting.shown.slices import slices

@@ -18,7 +18,7 @@ from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.of_models import editable
 from lambent.materials.lobes import widths
 from lambent.materials.models import model_named
-from lambent.materials.slope_curve import NODES_RHO
+from tests.materials.test_curve_lobes import KD_CURVE, curve_lobe
 
 CAMERA = Camera("view", (0.0, 1.0, 3.0), (0.0, 0.0, 0.0))
 ROUND = Lobe(mx=0.15, my=0.15, k=(0.8, 0.7, 0.6), r0=0.3)
@@ -81,16 +81,6 @@ def test_two_tints_of_one_lobe_are_no_lobe() -> None:
     one = session(Material(lobes=(BRUSHED,)))
     one.tint("it", "grazing", 0.5)
     assert export(one, "it", lobes=1).fitted == ("specular", "grazing")
-
-
-KD_CURVE = (0.2, 0.9, 1.0, 1.1, 1.0, 1.0, 0.9, 1.2)
-
-
-def curve_lobe(**numbers: object) -> Lobe:
-    """A lobe with a tail and a ring, whose Fresnel reflectance is that of no glass."""
-    shape = (1 + NODES_RHO**2) ** -1.8 + 0.1 * np.exp(-(((NODES_RHO - 1.5) / 0.4) ** 2))
-    fresnel = ((0.9, 0.5, 0.3, 0.2, 0.2, 0.2, 0.3, 0.4), (1.0,) * 8, (0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1))
-    return Lobe(distribution="curve", shape=tuple(shape.tolist()), fresnel=fresnel, k=(0.5, 0.4, 0.3), **numbers)
 
 
 def test_what_was_edited_becomes_a_curve_lobe_and_the_rest_stays() -> None:

@@ -33,6 +33,15 @@ SHAPES = {
 }
 FRESNEL = ((0.9, 0.5, 0.3, 0.2, 0.2, 0.2, 0.3, 0.4), (1.0,) * COSINE_NODES, (1.0, *[0.0] * (COSINE_NODES - 1)))
 KD_CURVE = (0.2, 0.9, 1.0, 1.1, 1.0, 1.0, 0.9, 1.2)
+
+
+def curve_lobe(**numbers: object) -> Lobe:
+    """A lobe with a tail and a ring, whose Fresnel reflectance is that of no glass."""
+    shape = (1 + NODES_RHO**2) ** -1.8 + 0.1 * np.exp(-(((NODES_RHO - 1.5) / 0.4) ** 2))
+    fresnel = ((0.9, 0.5, 0.3, 0.2, 0.2, 0.2, 0.3, 0.4), (1.0,) * 8, (0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2, 0.1))
+    return Lobe(distribution="curve", shape=tuple(shape.tolist()), fresnel=fresnel, k=(0.5, 0.4, 0.3), **numbers)
+
+
 MATERIALS = {
     "two widths": Material(
         kd=0.2, lobes=(Lobe(distribution="curve", shape=SHAPES["two widths"], mx=0.1, my=0.1, r0=0.5),)

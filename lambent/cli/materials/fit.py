@@ -13,7 +13,7 @@ from lambent.materials.fitting.choices import DISTRIBUTION, DistributionChoice
 
 if TYPE_CHECKING:
     from lambent.materials.document import Material
-    from lambent.materials.fitting.fit import FitResult
+    from lambent.materials.fitting.result import FitResult
     from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 
 UNITS = {"mx": "slope", "my": "slope", "r0": "reflectance at normal incidence", "alpha": "exponent"}

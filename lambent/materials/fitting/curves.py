@@ -26,9 +26,9 @@ from lambent.materials.fresnel import schlick_weight
 from lambent.materials.lobes import NUMPY
 from lambent.materials.slope_curve import NODES_LOG, NODES_RHO, ROW, normalised, quantile, slope_table
 
-STRENGTHS = (1e-6, 1e-4, 1e-2)  # of the penalty, in units of the start's error
+STRENGTHS = (1e-4, 1e-2, 1.0)  # of the penalty, in units of the start's error
 FOLDS = 5  # a fifth of the tuples is held out
-CURVE_VALUES = (30_000, 240_000)  # measured values (tuples times channels) of the trials and of the final fit
+CURVE_VALUES = (90_000, 240_000)  # measured values (tuples times channels) of the trials and of the final fit
 CURVE_STEPS = (25, 15)
 KD_GAIN = 0.02  # share of E that a curve of the diffuse term must remove
 DARKEST = -30.0  # least ln of the start's density

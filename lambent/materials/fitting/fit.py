@@ -18,12 +18,13 @@ from lambent.core.plain import Triple, triple
 from lambent.core.progress import Cancelled, Progress, silent
 from lambent.materials.document import Distribution, Kind, Lobe, Material, Provenance, Side
 from lambent.materials.fitting import account, gradient, parameters
-from lambent.materials.fitting.account import Comparison, Curve
+from lambent.materials.fitting.account import Curve
 from lambent.materials.fitting.choices import DISTRIBUTION, DistributionChoice
 from lambent.materials.fitting.curves import DARK, CurveFit, fit_curve
 from lambent.materials.fitting.gradient import Bounds
 from lambent.materials.fitting.parameters import BOUNDS, RETRO_BOUNDS, SHAPE, Box, Fixed, Ranges, parameter
 from lambent.materials.fitting.problem import Candidate, Found, Mixture, Problem, problem_of
+from lambent.materials.fitting.result import FitResult, by_lobes, fewer
 from lambent.materials.fitting.scale import diffuse_mode
 from lambent.materials.measured.inspecting.inspection import towards_light
 from lambent.materials.measured.inspecting.metrics import Metric, errors_of, metric_named
@@ -42,38 +43,6 @@ CURVED = ("kd", "kt_d", "alpha", "t_alpha", "kr", "r_mx", "r_my", "r_r0", "r_alp
 GAIN = 0.05  # share of E that another lobe must remove if the number of lobes is "auto"
 RETRO_RATIO = 2.0  # median of f near the light over that beside it, above which a retro lobe is tried
 RETRO_GAIN = 0.1  # share of E that a retro lobe must remove to be taken
-
-
-@dataclass(frozen=True)
-class FitResult:
-    """A fitted material and its quality.
-
-    Attributes
-    ----------
-    material : Material
-        With its provenance.
-    errors, lambertian_errors : dict of float
-        Metric name -> E of the material, and of the best Lambertian surface under that metric.
-    seconds : float
-        Wall-clock time.
-    warnings : tuple of str
-        Reasons to doubt the numbers.
-    partial : bool
-        Whether the fit was cancelled and this is the best found so far.
-    notes : tuple of str
-        Choices that the fit made.
-    albedos : tuple of Comparison
-        Albedo of the material and of the whole table, per side; empty if the fit was given tuples alone.
-    """
-
-    material: Material
-    errors: dict[str, float]
-    lambertian_errors: dict[str, float]
-    seconds: float
-    warnings: tuple[str, ...]
-    partial: bool
-    notes: tuple[str, ...] = ()
-    albedos: tuple[Comparison, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -209,7 +178,7 @@ def fit(
     warnings = (
         *account.warnings_of(samples, material, model, fitted, task.metric.name),
         *(one.warning(keep_albedo) for one in compared if one.doubtful),
-        *_fewer(found, lobes),
+        *fewer(found, lobes),
     )
     if partial:
         warnings = ("cancelled: best result so far", *warnings)
@@ -226,7 +195,7 @@ def fit(
             *samples.info.notes,
             *account.below_zero(samples, task.metric),
             *account.restrictions(task.fix, task.ranges),
-            *_by_lobes(found),
+            *by_lobes(found),
             *tried,
             *warnings,
         ),
@@ -403,23 +372,3 @@ def _lobe(kind: Kind, index: int, candidate: Candidate, distribution: Distributi
 
 def _rgb(values: Floats) -> Triple:
     return triple(np.broadcast_to(values, 3))
-
-
-def _by_lobes(found: dict[Side, Found]) -> list[str]:
-    """One line per side with several models: the side's E with one lobe, two, ..."""
-    lines = []
-    for side, one in found.items():
-        metric = one.problem.metric
-        if len(one.models) > 1:
-            tuples = replace(one.problem, kept=None)
-            errors = ", ".join(f"{tuples.remaining(model) ** (1 / metric.power):.4g}" for model in one.models)
-            lines.append(f"{side}: {metric.name} error {errors} with 1 to {len(one.models)} lobes")
-    return lines
-
-
-def _fewer(found: dict[Side, Found], lobes: Lobes) -> list[str]:
-    return [
-        f"{side}: {count} lobe(s); another one reduces the error no further"
-        for side, one in found.items()
-        if isinstance(lobes, int) and 0 < (count := one.mirroring) < lobes
-    ]

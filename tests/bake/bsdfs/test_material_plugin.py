@@ -10,6 +10,7 @@ from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.checking.chi_square import chi_square
 from lambent.materials.document import Lobe, Material
+from tests.materials.test_curve_lobes import KD_CURVE, curve_lobe
 from tests.tools.in_mitsuba import furnace_box, interaction, random_directions, sampler_of, square, vectors
 
 BRUSHED = Lobe(mx=0.3, my=0.07, k=(0.5, 0.6, 0.7), r0=(0.5, 0.6, 0.7), alpha=0.43)
@@ -20,6 +21,11 @@ MATERIALS = {
     "ggx": Material(lobes=(BRUSHED.model_copy(update={"distribution": "ggx"}),)),
     "transmission": Material(lobes=(BRUSHED.model_copy(update={"side": "transmission"}),)),
     "retro": Material(kd=0.1, lobes=(BRUSHED.model_copy(update={"retro": True, "alpha": -1.5}),)),
+    "curves": Material(
+        kd=(0.3, 0.2, 0.1),
+        kd_curve=KD_CURVE,
+        lobes=(curve_lobe(mx=0.2, my=0.1, alpha=0.2), curve_lobe(mx=0.3, my=0.3, side="transmission")),
+    ),
     "mixture": Material(
         kd=(0.1, 0.2, 0.3),
         kt_d=0.1,
@@ -49,7 +55,7 @@ def test_values_densities_and_samples_equal_numpy(mi, name):
     assert same.mean() > 0.998  # float32 may choose another component where u_select lies on the border
 
 
-@pytest.mark.parametrize("name", ["retro", "mixture"])
+@pytest.mark.parametrize("name", ["retro", "curves", "mixture"])
 def test_samples_follow_the_density(mi, name):
     plugin = mi.load_dict(material_dict(MATERIALS[name]))
     test = chi_square(*sampler_of(plugin, direction(np.radians(50), 0.4)), samples=400_000)
