@@ -33,11 +33,29 @@ class Frames:
         self.io.display_size = size
         layout.set_style()
         recording(monkeypatch.setattr, self.rects, self.focused)
+        self._note_disabled(monkeypatch)
         self.frame(2)
 
     def close(self):
         implot.destroy_context()
         imgui.destroy_context(self._context)
+
+    def _note_disabled(self, monkeypatch):
+        """Keep labels of controls that are greyed out from `rects` in `greyed`."""
+        begin, end, before = imgui.begin_disabled, imgui.end_disabled, []
+        self.greyed = set()
+
+        def begin_noted(disabled=True):
+            before.append((disabled, set(self.rects)))
+            begin(disabled)
+
+        def end_noted():
+            disabled, known = before.pop()
+            self.greyed |= set(self.rects) - known if disabled else set()
+            end()
+
+        monkeypatch.setattr(imgui, "begin_disabled", begin_noted)
+        monkeypatch.setattr(imgui, "end_disabled", end_noted)
 
     def new_rects(self):
         return {}

@@ -47,7 +47,7 @@ def test_the_texture_of_a_material(panels, state, tmp_path):
     Image.fromarray(np.full((4, 4, 3), (0, 255, 0), np.uint8)).save(tmp_path / "grass.png")
     panels.mode.drop(str(tmp_path / "grass.png"))
     assert "select one first" in state.screen.messages[-1].text
-    panels.click("table##1", 0.2)
+    state.selection.choose("table")
     panels.frame()
     panels.mode.drop(str(tmp_path / "grass.png"))
     assert isinstance(state.materials.edits.room.textures["brass"], ImageTexture)
@@ -144,7 +144,7 @@ def test_samples(panels, state):
 
 
 def test_material_sliders(panels, state):
-    panels.click("table##1", 0.2)
+    state.selection.choose("table")
     assert state.selection.name == "table"
     panels.frame()
     before = state.materials.edits.current("brass").lobes[0]

@@ -12,9 +12,9 @@ from lambent.viewer.modes.walk.session.texturing import LEAST_REPEAT, MOST_SHOWN
 from lambent.viewer.modes.walk.session.thumbnails import SIDE
 from lambent.viewer.modes.walk.state import Materials, Selection, WalkState
 from lambent.viewer.panels import editing, parameters
-from lambent.viewer.panels.widgets import buttons, choice, explain, listed, path_field, press, px, slider
+from lambent.viewer.panels.widgets import buttons, choice, explain, path_field, press, px, slider
 
-LISTED, ROWS = 5, 2.4  # lines of the list of objects, rows of finishes that are in sight
+ROWS = 2.4  # of finishes that are in sight
 BALL_PX, GAP_PX = 64.0, 3.0  # least width of a finish, and between two
 NOTHING = "nothing"
 
@@ -22,8 +22,7 @@ NOTHING = "nothing"
 def draw(state: WalkState, finishes: Finishes) -> None:
     """Draw the panel of the present size of the window."""
     selection, materials = state.selection, state.materials
-    in_numbers = state.screen.size == "measure"
-    (_objects if in_numbers else _object)(selection)
+    _object(selection)
     name, editor = selection.material, materials.editor
     if name is None:
         imgui.text_wrapped("Click an object in the picture, or choose it above.")
@@ -32,8 +31,8 @@ def draw(state: WalkState, finishes: Finishes) -> None:
         editing.draw(editor)
         imgui.separator_text("fit")
         editing.draw_fit(editor)
-    elif in_numbers:
-        _numbers(materials, selection, name)
+    elif state.screen.size == "measure":
+        _numbers(materials, name)
         _texture(state.texturing, name)
         imgui.separator()
         _file(materials, name)
@@ -100,8 +99,7 @@ def _ball(finishes: Finishes, finish: Finish, number: int, size: float) -> bool:
     return bool(pressed)
 
 
-def _numbers(materials: Materials, selection: Selection, name: str) -> None:
-    imgui.separator_text(f"{selection.name}: {name}")
+def _numbers(materials: Materials, name: str) -> None:
     edits = materials.edits
     material = edits.current(name)
     edited, materials.linked_roughness = parameters.edited(material, materials.linked_roughness)
@@ -119,22 +117,6 @@ def _file(materials: Materials, name: str) -> None:
     _reset(materials, name)
     _save(materials, name)
     _compare(materials, name)
-
-
-def _objects(selection: Selection) -> None:
-    objects = selection.objects
-    height = min(len(objects), LISTED) * imgui.get_text_line_height_with_spacing()
-    imgui.begin_child("objects", (0, height), imgui.ChildFlags_.nav_flattened)
-    for index, item in enumerate(objects):
-        if listed(f"{item.name}##{index}", item.name == selection.name, f"selects {item.name}, of {item.material}"):
-            selection.choose(item.name)
-            selection.reveal = False  # it is in sight
-        if item.name == selection.name and selection.reveal:
-            imgui.set_scroll_here_y()
-            selection.reveal = False
-        imgui.same_line(0.5 * imgui.get_content_region_avail().x)
-        imgui.text_disabled(item.material)
-    imgui.end_child()
 
 
 def _texture(texturing: Texturing, name: str) -> None:
