@@ -7,10 +7,13 @@ python3 run.py demo --headless && .venv/bin/python docs/pictures.py [out/demo]
 .venv/bin/python docs/pictures.py interreflections
 .venv/bin/python docs/pictures.py light-fields
 .venv/bin/python docs/pictures.py light-groups [STORE]
+.venv/bin/python docs/pictures.py window [STORE]              # needs Xvfb, xdotool and xprop
 """
 
 from __future__ import annotations
 
+import itertools
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -29,6 +32,7 @@ if TYPE_CHECKING:
     from lambent.bench.scenes.light_field_view import LightFieldView
 
 PICTURES = Path(__file__).parent / "pictures"
+sys.path.insert(0, str(PICTURES.parents[1]))  # for the driver of windows, which the tests have
 LIMIT_BYTES = 300_000
 EXPOSURE_EV = exposure_of(11.1)  # of the built-in room
 SCENES = {
@@ -161,6 +165,72 @@ def light_groups(store: Path | None = None) -> None:
     save("light-groups.jpg", np.concatenate(row, axis=1), width=1680)
 
 
+WINDOW_SAMPLES = 6  # denoised, of the pictures at rest
+WINDOWS = {  # by size: a key, a place to click, panels to open
+    "show": ("1", None, ()),
+    "design": ("2", (560, 560), ()),
+    "measure": ("3", (520, 420), ("View", "Scene", "Light meter", "Statistics")),
+}
+
+
+def window(store: Path | None = None) -> None:
+    """The sizes of the window on `builtin:room`: at 1280x800 here, at 2560x1600 and twice the scale in out/window.
+
+    `store` was baked with light groups.
+    """
+    import shutil
+    from tempfile import TemporaryDirectory
+
+    from lambent.bake.bake import bake
+    from lambent.core.light.light_mix import LightMix, parse_light
+    from lambent.scenes import load_scene
+    from lambent.store.kept.session import FILE, RoomState, WalkSession, write_session
+
+    large = PICTURES.parents[1] / "out" / "window"
+    large.mkdir(parents=True, exist_ok=True)
+    states = {}
+    for name, (light, _) in zip(("overcast", "night"), LIGHTS[1:], strict=True):
+        mixes = {group: keys[0][1] for group, keys in parse_light(light).groups.items()}
+        states[name] = RoomState(light=LightMix(mixes))
+    with TemporaryDirectory() as folder:
+        room = Path(folder) / "room.store"
+        if store:
+            shutil.copytree(store, room)
+        else:
+            bake(load_scene("builtin:room"), room, light_groups="scene").close()
+        for size, ratio in itertools.product(WINDOWS, (1, 2)):
+            write_session(room / FILE, WalkSession(states=states))
+            picture = window_picture(room, Path(folder) / f"{size}-{ratio}", size, ratio)
+            if ratio == 1:
+                save(f"window-{size}.jpg", picture, width=1280)
+            else:
+                Image.fromarray(picture).save(large / f"window-{size}.png")
+
+
+def window_picture(store: Path, out: Path, size: str, ratio: int) -> np.ndarray:
+    """The window in a size, at rest, as (H, W, 3), with `ratio` pixels for one."""
+    from tests.viewer.window_session import VirtualScreen, WindowSession
+
+    out.mkdir()
+    key, point, panels = WINDOWS[size]
+    screen = VirtualScreen((1280 * ratio, 800 * ratio), dpi=96 * ratio)
+    opened = WindowSession(screen, store, out, (1280, 800), settings={"size": size, "card_seen": True})
+    try:
+        opened.tool("key", key)
+        if point:
+            opened.click(*(ratio * at for at in point))
+        for panel in panels:
+            opened.click(*(ratio * at for at in opened.point(panel, 0.3)))
+        opened.move(ratio * 640, ratio * 20)
+        least = max(WINDOW_SAMPLES // ratio**2, 1)
+        opened.wait_for(lambda state: int((re.findall(r"(\d+) sample", state["at_rest"]) or [0])[0]) >= least)
+        opened.settle()
+        return screen.picture()
+    finally:
+        opened.kill()
+        screen.close()
+
+
 def light_fields() -> None:
     """What the teapot of `builtin:pavilion` mirrors: one of its maps; by one map, by B_n, marched, and traced."""
     from tempfile import TemporaryDirectory
@@ -219,6 +289,8 @@ if __name__ == "__main__":
         interreflections()
     elif sys.argv[1:] == ["light-fields"]:
         light_fields()
+    elif sys.argv[1:2] == ["window"]:
+        window(Path(sys.argv[2]) if len(sys.argv) > 2 else None)
     elif sys.argv[1:2] == ["light-groups"]:
         light_groups(Path(sys.argv[2]) if len(sys.argv) > 2 else None)
     else:

@@ -116,6 +116,8 @@ class Input:
                 self.screen.close_wanted = True
             elif key in SCALES:
                 self._scale(SCALES[key])
+        elif key == "F6":
+            self.screen.by_keys = True
         elif key == "p":
             self.screen.save_wanted = True
         elif key == "h":

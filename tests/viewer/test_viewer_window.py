@@ -71,6 +71,15 @@ def test_a_slider_changes_the_material_and_not_the_camera(session):
     session.wait_for(lambda state: state["camera"] != before["camera"])
 
 
+def test_a_notch_of_the_wheel_is_a_step(session):
+    session.move(60, 60)
+    session.tool("click", 4)
+    session.wait_for(lambda state: state["camera"]["position"][2] < FRONT.position[2] - 0.1)
+    turned = session.state()["camera"]["target"]
+    session.tool("click", 7)  # sideways, as two fingers scroll
+    session.wait_for(lambda state: state["camera"]["target"] != turned)
+
+
 def test_a_file_goes_to_the_object_that_it_is_dropped_onto(session, tmp_path):
     MATERIALS["brass"].model_copy(update={"kd": (0, 0, 0.5), "lobes": ()}).save(tmp_path / "blue.json")
     session.drop(tmp_path / "blue.json", *BALL)

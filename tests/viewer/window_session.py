@@ -1,5 +1,6 @@
 """A window in a process of its own on a virtual screen, driven by xdotool."""
 
+import io
 import json
 import os
 import shutil
@@ -8,6 +9,10 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+from PIL import Image
 
 from tests.viewer.panel_driver import point_of
 
@@ -23,13 +28,25 @@ def missing_tools():
 
 
 class VirtualScreen:
-    def __init__(self):
-        read, write = os.pipe()
-        command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1280x1024x24", "-nolisten", "tcp"]
+    """An X server of its own; `dpi` is what the desktop says of its screen, 96 for one pixel by point."""
+
+    def __init__(self, size=(1280, 1024), dpi=96):
+        self._size, (read, write) = "x".join(map(str, size)), os.pipe()
+        command = ["Xvfb", "-displayfd", str(write), "-screen", "0", f"{self._size}x24", "-nolisten", "tcp", "-noreset"]
         self._process = subprocess.Popen(command, pass_fds=[write], stderr=subprocess.DEVNULL)
         os.close(write)
         with os.fdopen(read) as pipe:
             self.name = f":{pipe.readline().strip()}"
+        if dpi != 96:
+            said = ["xprop", "-root", "-f", "RESOURCE_MANAGER", "8s", "-set", "RESOURCE_MANAGER", f"Xft.dpi:\t{dpi}\n"]
+            subprocess.run(said, env={**os.environ, "DISPLAY": self.name}, check=True)
+
+    def picture(self):
+        """All that the screen shows, (H, W, 3)."""
+        command = [imageio_ffmpeg.get_ffmpeg_exe(), "-f", "x11grab", "-video_size", self._size, "-i", self.name]
+        command += ["-frames:v", "1", "-f", "image2pipe", "-c:v", "png", "-"]
+        grabbed = subprocess.run(command, capture_output=True, timeout=60, check=True).stdout
+        return np.asarray(Image.open(io.BytesIO(grabbed)).convert("RGB"))
 
     def close(self):
         self._process.terminate()

@@ -162,6 +162,12 @@ def test_the_keys_stay_with_the_controls_from_size_to_size_until_a_click(window,
     assert not state.screen.by_keys and state.navigation.playing, "the click counts"
 
 
+@pytest.mark.parametrize("key", ["Tab", "F6"])
+def test_either_key_gives_the_controls_the_keys(window, state, key):
+    tap(window, key)
+    assert state.screen.by_keys and window.io.nav_visible
+
+
 @pytest.mark.parametrize("size", SIZES)
 def test_every_control_takes_the_keys(window, state, size):
     """Tab goes round all that can be pressed, moved or typed into."""

@@ -47,7 +47,7 @@ SHORTCUTS = (
     ("H", "hide or show the panels"),
     ("M, Shift+M", "the next size of the window: show, design, measure; the one before"),
     ("+, -", "brighter, darker by 1/3 EV"),
-    ("Tab", "the controls by arrows, Space and Enter; Esc returns to the picture"),
+    ("Tab, F6 (in every mode)", "the controls by arrows, Space and Enter; Esc returns to the picture"),
     ("Ctrl++, Ctrl+-, Ctrl+0", "larger or smaller letters; as at first"),
     ("F1", "show the first card again"),
 )

@@ -10,7 +10,8 @@ from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.panels.widgets import choice, press, px
 from lambent.viewer.sizes import draw_control
 
-BAR_PX, LIST_PX, PLAY_PX, CONTROL_PX, MARGIN_PX = 40, 190, 60, 220, 10
+BAR_PX, LIST_PX, LEAST_PX, PLAY_PX, CONTROL_PX, MARGIN_PX = 40, 190, 70, 60, 220, 10
+FRAME = (1.0, 1.0, 1.0, 0.14)  # of a list, over the dark bar
 FLAGS = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings
 
 
@@ -35,11 +36,13 @@ def draw(state: WalkState, high: float) -> None:
     imgui.set_next_window_size((width, high))
     imgui.set_next_window_bg_alpha(0.8)
     imgui.push_style_var(imgui.StyleVar_.window_padding, (margin, (high - imgui.get_frame_height()) / 2))
+    imgui.push_style_color(imgui.Col_.frame_bg, FRAME)
     imgui.begin("bar", None, FLAGS)
     _lists(state, width - control - 3 * margin)
     imgui.same_line(width - control - margin)
     draw_control(state.screen, control)
     imgui.end()
+    imgui.pop_style_color()
     imgui.pop_style_var()
 
 
@@ -59,11 +62,18 @@ def _lists(state: WalkState, room_px: float) -> None:
 
 
 def _list(offered: Offers, width: float) -> None:
-    label = imgui.calc_text_size(offered.title).x + imgui.get_style().item_inner_spacing.x
-    imgui.align_text_to_frame_padding()
-    imgui.text_disabled(offered.title)
-    imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
+    """Draw a list in this width, with its title where there is room."""
+    gap = imgui.get_style().item_inner_spacing.x
+    label = imgui.calc_text_size(offered.title).x + gap
+    if width - label < px(LEAST_PX):
+        label = 0.0
+    else:
+        imgui.align_text_to_frame_padding()
+        imgui.text_disabled(offered.title)
+        imgui.same_line(0, gap)
     names = list(offered.acts) if offered.now in offered.acts else [offered.now, *offered.acts]
-    chosen = choice(f"##{offered.title}", offered.now, names, offered.meaning, max(width - label, 1.0))
+    chosen = choice(
+        f"##{offered.title}", offered.now, names, f"{offered.title}: {offered.meaning}", max(width - label, 1.0)
+    )
     if chosen != offered.now:
         offered.acts[chosen]()
