@@ -10,6 +10,7 @@ strength is the one of STRENGTHS that predicts tuples best which the fit has not
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -238,16 +239,21 @@ class _Descent:
 
 
 def start_of(problem: Problem, mixture: Mixture) -> CurveModel:
-    """The model of a mixture's first mirroring lobe in the form of curves."""
-    lobe = next(one for one in mixture.lobes if not one.retro)
-    mx, my, r0, alpha = (float(v) for v in lobe.shape)
-    shape = -2 * NODES_LOG if problem.distribution == "ggx" else np.maximum(-(NODES_RHO**2), DARKEST)
-    f = r0 + (1 - r0) * schlick_weight(COSINES)
+    """The mirroring lobes of a mixture as one: their densities add up, their other numbers are means by light."""
+    lobes = [one for one in mixture.lobes if not one.retro]
+    mx, my, r0, alpha = np.array([one.shape for one in lobes]).T
+    f = r0[:, None] + (1 - r0[:, None]) * schlick_weight(COSINES)
     f = f if problem.side == "reflection" else 1 - f
-    tint = np.log(np.maximum(lobe.k, 1e-9))[:, None] + np.log(np.maximum(f, 1e-6))
-    bent = np.array([alpha, np.log(my / mx)])
+    k = np.array([np.maximum(one.k, 1e-9) for one in lobes])  # (L, C)
+    light = k.mean(axis=1) * f[:, -1] / (k.mean(axis=1) * f[:, -1]).sum()
+    m = float(np.exp(light @ np.log(mx * my) / 2))
+    rho2 = NODES_RHO**2 * (m * m / (mx * my))[:, None]
+    density = (1 + rho2) ** -2.0 if problem.distribution == "ggx" else np.exp(np.maximum(-rho2, DARKEST))
+    shape = np.log(np.maximum((light / (mx * my)) @ density * m * m, np.exp(DARKEST)))
+    tint = np.log(np.maximum(np.einsum("lc,ln->cn", k, f), 1e-9))
+    bent = np.array([light @ alpha, light @ np.log(my / mx)])
     diffuse = np.log(np.maximum(mixture.diffuse, 1e-9))
-    return CurveModel(float(np.sqrt(mx * my)), shape, tint, bent, diffuse, np.zeros(COSINE_NODES))
+    return CurveModel(m, shape, tint, bent, diffuse, np.zeros(COSINE_NODES))
 
 
 def regauged(model: CurveModel) -> CurveModel:
@@ -278,51 +284,76 @@ def lobe_of(model: CurveModel, side: Side) -> Lobe:
     )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class _Tried:
+    """A descent on the tuples that were seen: its error on those held out, its settings, and where it ended."""
+
+    error: float
+    strength: float
+    bends_kd: bool
+    model: CurveModel
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """Tuples to fit and tuples held out, and what the fit may change."""
+
+    seen: Problem
+    unseen: Problem
+    others: Mixture
+    box: Box
+    diffuse_free: bool
+
+    def run(self, start: CurveModel, strength: float, bends_kd: bool) -> _Tried:
+        """A descent, stopped once on the way to choose the unit of slopes."""
+        descent = _Descent(self.seen, self.others, *_bounds(start, self.box, self.diffuse_free, bends_kd), strength)
+        model = descent.run(regauged(descent.run(start, CURVE_STEPS[0])), CURVE_STEPS[1])
+        return _Tried(replace(descent, problem=self.unseen).error(model), strength, bends_kd, model)
+
+
 def fit_curve(
-    problem: Problem, mixture: Mixture, box: Box, diffuse_free: bool, seed: int, progress: Progress,
-    compared: Mixture,
-) -> CurveFit:  # fmt: skip
-    """The best curve lobe from a mixture's first mirroring lobe; its retro lobe stays.
+    problem: Problem, mixtures: Sequence[Mixture], box: Box, diffuse_free: bool, seed: int, progress: Progress
+) -> CurveFit:
+    """The best curve lobe, from the mirroring lobes of each mixture; the retro lobe of the last one stays.
+
+    The error of the last one on the tuples held out is stated beside the curve lobe's.
 
     Parameters
     ----------
     box : Box
-        Of that lobe: ends of alpha; whether mx and my are one number.
-    compared : Mixture
-        Lobes whose error on the tuples held out is stated beside the curve lobe's.
+        Of a lobe: ends of alpha; whether mx and my are one number.
     """
-    channels = len(problem.measured)
+    mixture, channels = mixtures[-1], len(problem.measured)
     others = replace(mixture, lobes=tuple(one for one in mixture.lobes if one.retro))
-    trial, final = problem.thinned([values // channels for values in CURVE_VALUES], seed, (np.float64,) * 2)
-    is_held = np.random.default_rng(seed).permutation(len(trial)) % FOLDS == 0
-    seen, unseen = (trial.take(np.flatnonzero(part), trial.w[part], np.float64) for part in (~is_held, is_held))
-    start = start_of(problem, mixture)
+    tuples, final = problem.thinned([values // channels for values in CURVE_VALUES], seed, (np.float64,) * 2)
+    is_held = np.random.default_rng(seed).permutation(len(tuples)) % FOLDS == 0
+    seen, unseen = (tuples.take(np.flatnonzero(part), tuples.w[part], np.float64) for part in (~is_held, is_held))
+    trial = _Trial(seen, unseen, others, box, diffuse_free)
+    starts = [(start_of(problem, one), STRENGTHS[0]) for one in mixtures]
+    rounds, tries = len(starts) + len(STRENGTHS) + 1, list[_Tried]()
 
-    def tried(strength: float, bends_kd: bool) -> tuple[float, float, bool, CurveModel]:
-        progress(len(tries), len(STRENGTHS) + 2, f"curve lobe, {len(seen)} tuples")
-        descent = _Descent(seen, others, *_bounds(start, box, diffuse_free, bends_kd), strength)
-        model = descent.run(regauged(descent.run(start, CURVE_STEPS[0])), CURVE_STEPS[1])
-        return replace(descent, problem=unseen).error(model), strength, bends_kd, model
+    def attempt(start: CurveModel, strength: float, bends_kd: bool = False) -> _Tried:
+        progress(len(tries), rounds, f"curve lobe, {len(seen)} tuples")
+        tries.append(trial.run(start, strength, bends_kd))
+        return tries[-1]
 
-    tries: list[tuple[float, float, bool, CurveModel]] = []
-    for strength in STRENGTHS:
-        tries.append(tried(strength, False))
-    best = min(tries, key=lambda one: one[0])
+    best, start = min(((attempt(*one), one[0]) for one in starts), key=lambda pair: pair[0].error)
+    best = min([best, *(attempt(start, strength) for strength in STRENGTHS[1:])], key=lambda one: one.error)
     power = 1 / problem.metric.power
     if diffuse_free and np.any(mixture.diffuse > DARK):
-        bent = tried(best[1], True)
-        best = bent if bent[0] ** power < (1 - KD_GAIN) * best[0] ** power else best
-    progress(len(STRENGTHS) + 1, len(STRENGTHS) + 2, f"curve lobe, {len(final)} tuples")
-    free, limits = _bounds(best[3], box, diffuse_free, best[2])
-    model = _Descent(final, others, free, limits, best[1]).run(best[3], CURVE_STEPS[1])
+        bent = attempt(start, best.strength, True)
+        best = bent if bent.error**power < (1 - KD_GAIN) * best.error**power else best
+    progress(rounds - 1, rounds, f"curve lobe, {len(final)} tuples")
+    bounds = _bounds(best.model, box, diffuse_free, best.bends_kd)
+    model = _Descent(final, others, *bounds, best.strength).run(best.model, CURVE_STEPS[1])
     curve = np.exp(model.kd_curve - model.kd_curve.max())
-    scale = np.exp(2 * (model.kd_curve - np.log(normalised(tuple(np.exp(model.kd_curve).tolist())))))[0]
+    scale = float((np.exp(model.kd_curve[0]) / normalised(tuple(np.exp(model.kd_curve).tolist()))[0]) ** 2)
     return CurveFit(
         lobe_of(model, problem.side),
         np.exp(model.diffuse) * scale if diffuse_free else mixture.diffuse,
-        tuple(curve.tolist()) if best[2] else None,
-        (best[0] * FOLDS) ** power,
-        (unseen.remaining(compared) * FOLDS) ** power,
+        tuple(curve.tolist()) if best.bends_kd else None,
+        (best.error * FOLDS) ** power,
+        (unseen.remaining(mixture) * FOLDS) ** power,
     )
 
 

@@ -225,11 +225,11 @@ def _check_curve(lobes: Lobes, fix: Fixed, ranges: Ranges, keep_albedo: bool) ->
 
 
 def _curve_of(found: Found, side: Side, task: Task, progress: Progress) -> CurveFit:
-    """The side's curve lobe, from its best model with one lobe besides a retro lobe."""
+    """The side's curve lobe, from its models with one lobe and with all of them."""
     models = [model for model in found.models if any(not lobe.retro for lobe in model.lobes)]
     box = next(box for box in found.boxes if not box.retro)
     free = ("kd" if side == "reflection" else "kt_d") not in task.fix
-    return fit_curve(found.problem, models[0], box, free, task.seed, progress, compared=models[-1])
+    return fit_curve(found.problem, [models[0], *models[1:][-1:]], box, free, task.seed, progress)
 
 
 def _worth(curve: CurveFit, found: Found, lobes: Lobes) -> tuple[bool, str]:

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from imgui_bundle import imgui
 
@@ -45,6 +46,7 @@ from lambent.viewer.modes.walk.panels import (
     states,
     view,
 )
+from lambent.viewer.modes.walk.panels.curves import CurvesPanel
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.session.finishes import Finishes
 from lambent.viewer.modes.walk.session.kept_view import restore
@@ -59,12 +61,13 @@ from lambent.viewer.sizes import SizedPanel
 def open_store(
     path: Path, movement: Movement, screen: Screen, light_field_mb: float | None = None, policy: str = LEAST_RECENT,
     sky_turn_deg: float = 0.0, replaced: tuple[str, ...] = (), fresh: bool = False,
+    device: Any = None,
 ) -> WalkMode:  # fmt: skip
     """Start the mode on a store with at least geometry and the scene record; else raise `UserError`.
 
     `light_field_mb` is the GPU memory for light field maps, cached by a `policy` of `baked.light_fields.map_cache`;
     `sky_turn_deg` rotates the sky; `replaced` are meshes in place of objects (`scenes.replacement`); `fresh` leaves the
-    store's session aside.
+    store's session aside; the room is drawn on a `device`, by default its own.
     """
     store = Store.open(path)
     baked = with_replacements(read_baked(store, light_field_mb, policy), parse_replacements(replaced))
@@ -83,7 +86,7 @@ def open_store(
     state.texturing.keeps = lambda: state.session.has_lock
     state.notes, state.knows_noise = light_map_notes(store), baked.noise is not None
     geometry = Geometry(baked.positions, baked.faces, state.selection.objects)
-    renderer = Renderer(open_device(device_needs(baked)), baked)
+    renderer = Renderer(device or open_device(device_needs(baked)), baked)
     pictures = Pictures(renderer, state, AnsweringLight(store, renderer, state.answering))
     falling = FallingLight(baked, store, lambda: pictures.light_groups)
     return WalkMode(state, WalkInput(state, geometry), pictures, falling)
@@ -208,6 +211,7 @@ def panels(state: WalkState, falling: FallingLight | None, finishes: Finishes) -
             "the objects, and the material of the selected one",
             opened=True,
         ),
+        SizedPanel("Curves", CurvesPanel(state).draw, "pull the curves of the selected material"),
         SizedPanel(
             "Light on it",
             light_on_it,
