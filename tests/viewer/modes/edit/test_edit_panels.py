@@ -50,7 +50,9 @@ def test_clicks_select_and_the_name_follows_the_mouse(driver):
     driver.mode.input.handle({"event_type": "pointer_leave"}, ui_has_mouse=False, ui_has_keys=False)
     assert state.pointed is None
     driver.mode.input.handle(
-        {"event_type": "wheel", "x": 50, "y": 50, "dy": 100}, ui_has_mouse=False, ui_has_keys=False
+        {"event_type": "wheel", "x": 50, "y": 50, "dx": 0, "dy": 100, "modifiers": ()},
+        ui_has_mouse=False,
+        ui_has_keys=False,
     )
     driver.frame()
 
