@@ -11,7 +11,7 @@ from lambent.core.errors import UserError
 from lambent.materials.document import Material, load_material
 from lambent.viewer.edits.edits import MaterialEdits
 from lambent.viewer.modes.walk.session.texturing import Texturing
-from lambent.viewer.modes.walk.session.thumbnails import Thumbnail, ball
+from lambent.viewer.modes.walk.session.thumbnails import Thumbnail, ball, name_of
 from lambent.viewer.screen import Screen
 
 MOST_DOCUMENTS = 500  # of a folder
@@ -59,7 +59,7 @@ class Finishes:
 
     def is_unusable(self, finish: Finish) -> bool:
         """Whether the file was found to be no material document."""
-        return self.thumbnail(finish) in self.texturing.thumbnails.failed
+        return name_of(finish) in self.texturing.thumbnails.failed
 
     def _picture(self, finish: Finish) -> Thumbnail:
         return ball(self._material(finish))

@@ -46,7 +46,7 @@ class Thumbnails:
 
         `make` is called in the background and may raise `UserError`: then there is none.
         """
-        name = f"thumbnail {key}"
+        name = name_of(key)
         self._work = pending(self._work)
         if name not in self._images and name not in self.failed and self._work is None:
 
@@ -55,6 +55,11 @@ class Thumbnails:
 
             self._work = Work(lambda _: make(), keep, lambda _: self.failed.add(name))
         return name
+
+
+def name_of(key: Hashable) -> str:
+    """The name of the thumbnail of a key."""
+    return f"thumbnail {key}"
 
 
 def texture_thumbnail(reflectance: Floats) -> Thumbnail:

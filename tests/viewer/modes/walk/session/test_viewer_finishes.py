@@ -127,6 +127,19 @@ def test_words_leave_an_untouched_material_bit_equal(monkeypatch):
         assert seen["shine"] == pytest.approx(100 if any(lobe.k[0] for lobe in material.lobes) else 0)
 
 
+def test_only_finishes_in_sight_are_pictured(monkeypatch, state, geometry, screen):
+    for number in range(60):
+        GOLD.save(screen.folder / f"gold {number:02}.json")
+    screen.size = "design"
+    window = PanelDriver(monkeypatch, walk_mode(state, geometry))
+    state.selection.choose("table")
+    asked = set()
+    monkeypatch.setattr(state.texturing.thumbnails, "get", lambda key, make: asked.add(key) or "none")
+    window.frame(3)
+    window.close()
+    assert 10 < len(asked) < 20
+
+
 def test_pictures_of_finishes_reach_the_window(monkeypatch, state, geometry, screen):
     """A button shows its thumbnail once the window has made a texture of it."""
     state.screen.size = "design"
