@@ -52,12 +52,12 @@ def run(
     from lambent.viewer.window import Window
 
     window = Window(opened, size=size, frames=frames)
-    with kept(opened.rescue):
+    with kept(lambda: window.mode.rescue()):  # the mode may be exchanged
         try:
             window.run()
         finally:
-            opened.drawing.close()
-    opened.close()
+            window.mode.drawing.close()
+    window.mode.close()
 
 
 def starts() -> dict[str, ModuleType]:

@@ -84,6 +84,9 @@ class Screen:
     asks_to_close: bool = False  # whether the question about unsaved work is shown
     closes: bool = False  # whether the question was answered and the window closes
     wake: Callable[[], None] = lambda: None  # draws a frame soon; any thread may call it
+    enter: Callable[[Any], Any] | None = None  # returns the mode to exchange the present one for, see `exchange`
+    exchanging: bool = False  # whether the present mode is being closed for another one
+    histories: dict[Path, Any] = field(default_factory=dict)  # of edits, by store, for the mode that comes back
     remembered: Remembered = field(default_factory=Remembered)
     card_shown: bool = False  # whether the card of the first start is shown
     by_keys: bool = False  # whether keys go to the controls instead of the picture

@@ -125,6 +125,8 @@ class Window:
         since_last_s, self._drawn_s = now_s - self._drawn_s, now_s
         self.mode.input.steer(self._pad.now, since_last_s if self._moving else 0.0)
         self.mode.advance(since_last_s if self._moving else 0.0)  # a sleep before the first step is no walking
+        if (enter := self.screen.enter) is not None:
+            self.screen.enter, self.mode = None, enter(self.mode)
         if self.screen.close_wanted or self.screen.closes:
             self._want_close()
         self.screen.drop_old_messages()

@@ -152,11 +152,12 @@ class KeptView(Strict):
 class EditedView(Strict):
     """A view whose materials are edited in place: a `lambent.editing` session document, of files by the store's folder.
 
-    `room` has the materials of the current state then, which the document started from, or which show its edits.
+    `room` has the materials of the current state then, which the document started from; those of `shown` show its edits.
     """
 
     document: dict[str, Any]
     room: dict[str, Material] = Field(default_factory=dict)
+    shown: tuple[str, ...] = ()
 
 
 class WalkSession(Strict):

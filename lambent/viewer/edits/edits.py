@@ -176,6 +176,16 @@ class MaterialEdits:
         """Start a new history from a saved session; earlier steps cannot be undone."""
         self._history = History(replace(self._state_of(session), tracks=self.tracks))
 
+    @property
+    def history(self) -> History[_State]:
+        """All steps, for `resume`."""
+        return self._history
+
+    def resume(self, history: History[_State]) -> None:
+        """Go on with the steps of earlier edits, to the present state, as one more stroke if it differs."""
+        now, self._history = self._history.now, history
+        self._history.change(replace(now, notes=history.now.notes, tracks=history.now.tracks))
+
     def go_to(self, session: WalkSession) -> None:
         """Take a whole session, as one stroke."""
         self.end_stroke()

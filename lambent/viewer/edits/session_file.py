@@ -167,7 +167,12 @@ class SessionFile:
         self.fault = fault
 
     def save(self) -> bool:
-        """Write the session at once; return whether the file is current."""
+        """Write the session at once, and say so; return whether the file is current."""
+        self._write_now()
+        self._screen.say(self.fault or "the session is saved in the store")
+        return not self.fault
+
+    def _write_now(self) -> None:
         self._finish()
         if self.has_lock:
             self._latest = self.session
@@ -175,8 +180,6 @@ class SessionFile:
                 self._done(self._write(self._latest) if self._is_due else "")
             except UserError as error:
                 self._failed(error)
-        self._screen.say(self.fault or "the session is saved in the store")
-        return not self.fault
 
     def rescue(self) -> Iterator[str]:
         """Write the session of a lost window; yield its place as text. May raise `UserError`."""
@@ -188,9 +191,7 @@ class SessionFile:
 
     def close(self) -> None:
         """Write the session, and release it to another window."""
-        if self.keeps:
-            self.save()
-        self._finish()
+        self._write_now()
         self._release()
 
     def _finish(self) -> None:

@@ -5,12 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from lambent.core.errors import UserError
 from lambent.viewer.mode import Mode, check_there
 from lambent.viewer.screen import Screen
 
 check = check_there  # before a window is opened
 STARTS = ("edit",)
 NO_DISPLAY = "editing in place needs a display; without one, use `lambent.editing` from Python (docs/editing.md)"
+# Limits of a device that rooms need more of than is usual.
+OF_ROOM = ("max-buffer-size", "max-texture-dimension-2d", "max-storage-buffer-binding-size")
 
 
 def edits(path: Path) -> bool:
@@ -20,17 +23,31 @@ def edits(path: Path) -> bool:
     return kind_of(path) is not None
 
 
-def start(path: Path, name: str, screen: Screen, **options: Any) -> Mode:
-    """Start the mode on a scene, a store or a session; options as in `subject.opened`."""
-    from lambent.realtime.gpu.device import open_device
+def start(
+    path: Path, name: str, screen: Screen, *, device: Any = None, fitting: tuple[int, int] | None = None, **options: Any
+) -> Mode:
+    """Start the mode on a scene, a store or a session; options as in `subject.opened`.
+
+    `fitting` is a size whose aspect a view gets that has no edits yet; by default that of the option `picture`.
+    """
+    from lambent.realtime.gpu.device import choose_adapter, open_device
     from lambent.viewer.modes.edit.drawing import EditDrawing
     from lambent.viewer.modes.edit.in_place import InPlace
     from lambent.viewer.modes.edit.mode import EditMode
     from lambent.viewer.modes.edit.shown import backend_of
     from lambent.viewer.modes.edit.state import EditState
-    from lambent.viewer.modes.edit.subject import kind_of, opened
+    from lambent.viewer.modes.edit.subject import kind_of, of_aspect, opened
 
     keeper = InPlace(path, screen) if kind_of(path) == "store" else None
-    subject, device = opened(path, screen.folder, keeper=keeper, **options), open_device()  # locks end with the process
+    if keeper is not None and fitting is not None and options.get("camera") not in keeper.opened.edited:
+        options["picture"] = of_aspect(*fitting)
+    try:
+        subject = opened(path, screen.folder, keeper=keeper, **options)
+    except UserError:
+        if keeper is not None:
+            keeper.close()
+        raise
+    if device is None:  # which serves the whole room, too
+        device = open_device({name: choose_adapter().limits[name] for name in OF_ROOM})
     state = EditState(subject, screen, backend=backend_of(device), keeper=keeper)
     return EditMode(state, EditDrawing(device, state))

@@ -74,7 +74,7 @@ class Files:
     @property
     def unsaved(self) -> bool:
         """Whether the session has changed since it was opened or saved, and is not kept."""
-        return self._session.document != self._saved and not (self.keeper is not None and self.keeper.keeps)
+        return self._session.document != self._saved and (self.keeper is None or bool(self.keeper.fault))
 
     def poll(self) -> None:
         """Handle the end of the running task, and keep the session."""

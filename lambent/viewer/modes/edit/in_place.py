@@ -10,7 +10,7 @@ from lambent.core.views.camera import Camera
 from lambent.editing.session.document import EditedMaterial, OfDocument, SessionDocument, document_from, load_document
 from lambent.editing.session.session import Session
 from lambent.materials.document import Material
-from lambent.store.kept.session import FILE, EditedView, WalkSession
+from lambent.store.kept.session import FILE, EditedView, KeptView, WalkSession
 from lambent.viewer.edits.session_file import SOON_S, SessionFile
 from lambent.viewer.look import Look
 from lambent.viewer.screen import Screen
@@ -37,6 +37,8 @@ class InPlace(SessionFile):
         self._begun: SessionDocument | None = None  # as it need not be written
         self._of: tuple[object, object] | None = None  # document and materials of the section
         self._section: EditedView | None = None
+        self._shown: dict[str, EditedMaterial] = {}  # materials as the room shows them
+        self._left: dict[str, object] = {}  # of the view, for the mode that comes next
 
     def material(self, name: str, of_scene: Material) -> Material:
         """The material of the room."""
@@ -84,13 +86,25 @@ class InPlace(SessionFile):
     def begin(self, session: Session, look: Look) -> None:
         """Keep these edits, and the exposure and view transform of the `look`, which are the session's first."""
         self._edited, self._look, view = session, look, self.opened.view
-        is_kept = session.document.camera.name in self.opened.edited
-        unedited = all(one == EditedMaterial(source=one.source) for one in session.document.materials.values())
-        self._begun = session.document if is_kept or unedited else None
+        said, materials = self.opened.edited.get(session.document.camera.name), session.document.materials
+        plain = {name for name, one in materials.items() if one == EditedMaterial(source=one.source)}
+        self._begun = session.document if said is not None or len(plain) == len(materials) else None
+        shown = plain if said is None else set(said.shown)
+        self._shown = {name: one for name, one in materials.items() if name in shown}
         if view is not None:
             look.view_transform, look.scale = view.look.view_transform, view.look.scale
         if view is not None and view.look.exposure_ev is not None:
             look.exposure_ev, look.base_ev = view.look.exposure_ev, view.look.base_ev
+
+    @property
+    def unshown(self) -> list[str]:
+        """Materials that the room shows otherwise than as edited."""
+        now = {} if self._edited is None else self._edited.document.materials
+        return [name for name, one in now.items() if one != self._shown.get(name)]
+
+    def leave(self, camera: Camera, selected: str | None) -> None:
+        """Let the room be shown from a camera, with an object selected."""
+        self._left = {"camera": camera, "selected": selected}
 
     @property
     def has_exposure(self) -> bool:
@@ -100,7 +114,9 @@ class InPlace(SessionFile):
     def show_in_room(self, name: str, material: Material) -> None:
         """Let the room have a material as it is edited here."""
         self._now = self._now.model_copy(update={"materials": {**self._now.materials, name: material}})
-        self._begun = None  # the edits are those of the room now
+        self._begun = None  # to be written
+        if self._edited is not None:
+            self._shown[name] = self._edited.document.materials[name]
 
     @property
     def session(self) -> WalkSession:
@@ -109,7 +125,9 @@ class InPlace(SessionFile):
             view, look = self.opened.view, self._look
             shown: dict[str, object] = {"view_transform": look.view_transform, "scale": look.scale}
             shown |= {"exposure_ev": look.exposure_ev, "base_ev": look.base_ev} if self.has_exposure else {}
-            changes["view"] = view.model_copy(update={"look": view.look.model_copy(update=shown)})
+            changes["view"] = view.model_copy(update={"look": view.look.model_copy(update=shown), **self._left})
+        elif self._left:
+            changes["view"] = KeptView.model_validate(self._left)
         if self._edited is not None and self._edited.document is not self._begun:
             section, name = self._section_of(self._edited), self._edited.document.camera.name
             changes["edited"] = {**self.opened.edited, name: section}
@@ -122,5 +140,6 @@ class InPlace(SessionFile):
             materials = {**self._foreign, **document.materials}
             whole = document.model_copy(update={"scene": ".", "materials": materials})  # also of a store that moves
             room = {name: one for name, one in self._now.materials.items() if name in document.materials}
-            self._of, self._section = of, EditedView(document=whole.model_dump(mode="json"), room=room)
+            shown = tuple(name for name in document.materials if name not in self.unshown)
+            self._of, self._section = of, EditedView(document=whole.model_dump(mode="json"), room=room, shown=shown)
         return self._section

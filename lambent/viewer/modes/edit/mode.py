@@ -81,7 +81,7 @@ class EditMode(Mode):
         super().__init__(state.subject.name, state.screen, EditInput(state), drawing, columns(state))
         self.state = state
         if state.files.keeper is not None:
-            self.head = partial(panels.draw_head, state.files.keeper)
+            self.head = partial(panels.draw_head, state, state.files.keeper)
 
     @property
     def moving(self) -> bool:

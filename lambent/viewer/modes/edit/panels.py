@@ -27,8 +27,10 @@ HISTORY = ("undo", "redo")
 LEAST_CHOICE_PX = 80.0
 
 
-def draw_head(keeper: InPlace) -> None:
-    """Draw lines on the store's session, where it is not kept or not taken over whole."""
+def draw_head(state: EditState, keeper: InPlace) -> None:
+    """Draw the way back to the room, and lines on the store's session, where it is not kept or not taken over whole."""
+    meaning = "walks through the room from here; 'to the room' below lets it show a material as edited"
+    buttons([("walk from here", keeper.keeps and not state.files.busy, state.enter_room, meaning)])
     wrapped([line for line in (keeper.fault, *keeper.lines) if line], AMBER)
 
 

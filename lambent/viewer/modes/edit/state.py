@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from lambent.core.errors import UserError
@@ -15,6 +16,7 @@ from lambent.editing.session.document import SessionDocument
 from lambent.materials.factored.terms import Editable
 from lambent.store.source import changed_inputs
 from lambent.store.store import MANIFEST, Store
+from lambent.viewer.exchange import EDIT, WALK, exchanged
 from lambent.viewer.look import Look
 from lambent.viewer.mode import Divider
 from lambent.viewer.modes.edit.baking import LIGHTS, Baking
@@ -92,6 +94,9 @@ class EditState:
         if keeper is not None:
             keeper.begin(self.session, self.look)
             self._metered = self._metered or keeper.has_exposure
+            selected = None if keeper.opened.view is None else keeper.opened.view.selected
+            of = (o.material for o in subject.scene.objects if o.name == selected)
+            self.material = next((name for name in of if name in self.session.document.materials), self.material)
         self._bake = bake
         self.bounced = Bounced(self.painter, bake)
         self._sources: Sequence[object] = ()  # sources of materials at the last check of transport
@@ -165,6 +170,16 @@ class EditState:
             self._have_transport()
         direct = bool(self.loading.lights) and self.baking is None and not self.loading.busy
         self.bounced.tick(self.session, self.loading.folder, direct)
+
+    def enter_room(self) -> None:
+        """Go to the room, at the camera of this view; say which materials it shows otherwise than as edited."""
+        if (keeper := self.files.keeper) is not None:
+            if keeper.unshown:
+                self.screen.say(f"kept in this view, not shown in the room: {', '.join(keeper.unshown)}")
+            names = [o.name for o in self.subject.scene.objects if o.material == self.material]
+            before = None if keeper.opened.view is None else keeper.opened.view.selected
+            keeper.leave(self.session.document.camera, before if before in names else next(iter(names), None))
+            self.screen.enter = partial(exchanged, store=keeper.store, before=EDIT, name=WALK)
 
     def close(self) -> None:
         """Stop background work; finished work stays in the store."""

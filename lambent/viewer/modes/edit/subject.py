@@ -171,6 +171,12 @@ def _changes(
     return {**changes, "materials": {**session.document.materials, **found.document.materials}}
 
 
+def of_aspect(width: int, height: int) -> tuple[int, int]:
+    """A size with the aspect of another one, and about as many pixels as SIZE."""
+    scale = (SIZE[0] * SIZE[1] / max(width * height, 1)) ** 0.5
+    return max(1, round(scale * width)), max(1, round(scale * height))
+
+
 def camera_named(scene: Scene, base: Path | None, name: str | None) -> Camera:
     """A camera of the scene or a saved view of its store; without a name the first."""
     saved = read_views(base).cameras if base is not None else ()

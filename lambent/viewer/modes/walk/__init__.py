@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from lambent.baked.light_fields.map_cache import LEAST_RECENT
 from lambent.store.store import Store
@@ -21,10 +22,10 @@ def check(path: Path) -> None:
 def start(
     path: Path, name: str, screen: Screen, light_field_mb: float | None = None, policy: str = LEAST_RECENT,
     sky_turn_deg: float = 0.0, replaced: tuple[str, ...] = (), fresh: bool = False,
+    device: Any = None,
 ) -> Mode:  # fmt: skip
     """Start the mode on a store; parameters as in `mode.open_store`."""
     from lambent.viewer.modes.walk.mode import open_store
 
-    return open_store(
-        path, "walk" if name == "walk" else "orbit", screen, light_field_mb, policy, sky_turn_deg, replaced, fresh
-    )
+    how = light_field_mb, policy, sky_turn_deg, replaced, fresh, device
+    return open_store(path, "walk" if name == "walk" else "orbit", screen, *how)

@@ -160,7 +160,7 @@ class WalkState:
 
     @property
     def unsaved_materials(self) -> tuple[str, ...]:
-        """Materials that are saved neither in the session nor as a document."""
+        """Materials that are kept neither in the session nor as a document."""
         return tuple(name for name in self.session.unsaved if name in self.scene.materials)
 
     @classmethod

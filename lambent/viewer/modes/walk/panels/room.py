@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from imgui_bundle import imgui
 
+from lambent.viewer.modes.walk.session.leaving import edit_view
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.panels.widgets import buttons, check, status, wrapped
 
@@ -19,6 +22,8 @@ def draw(state: WalkState) -> None:
     buttons([
         ("undo", edits.can_undo, edits.undo, "undoes the last change of a material or the light (Ctrl+Z)"),
         ("redo", edits.can_redo, edits.redo, "redoes the change (Ctrl+Shift+Z)"),
+        ("edit this view", session.keeps and state.rebaking.possible, partial(edit_view, state),
+         "pulls the curves of the materials in this view, under exact direct light"),
     ])  # fmt: skip
     if session.fault:
         wrapped([session.fault])

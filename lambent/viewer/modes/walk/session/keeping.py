@@ -34,6 +34,8 @@ class SessionKeeper(SessionFile):
             return ()
         lines = self.read(self._folder, fresh=fresh)
         self._edits.begin_from(self.opened)
+        if (history := self._screen.histories.pop(self._folder, None)) is not None:
+            self._edits.resume(history)
         if not self.fault and not fresh:
             lines += self._take_former_backup(self._folder / FORMER_BACKUP)
         session = self._edits.session
@@ -96,7 +98,10 @@ class SessionKeeper(SessionFile):
 
     def close(self) -> None:
         """Write the session, release it to another window, and delete images that no session uses."""
-        if self.keeps and self.save() and self._folder is not None:
+        self._write_now()
+        if self._folder is not None and self._screen.exchanging:
+            self._screen.histories[self._folder] = self._edits.history
+        elif self._folder is not None and self.keeps:
             self._remove_images(self._folder)
         super().close()
 

@@ -1,0 +1,138 @@
+"""The room and one of its views, edited in place, in one window: camera, selection, light and edits stay."""
+
+from dataclasses import replace
+
+import pytest
+
+from lambent.core.errors import UserError
+from lambent.editing.curves.operators import Region
+from lambent.editing.session.document import OfDocument
+from lambent.store.kept.session import FILE, read_session
+from lambent.store.kept.views import read_views
+from lambent.viewer.modes.edit.mode import EditMode
+from lambent.viewer.modes.walk.mode import WalkMode, open_store
+from lambent.viewer.modes.walk.session.leaving import edit_view
+
+LOW = Region(a=-0.2, b=0.0, c=0.3, d=0.9)
+BLUE = (0.1, 0.1, 0.6)
+
+
+@pytest.fixture
+def mode(adapter, baked_box, screen):
+    """The room on foot, after an edit, away from its cameras; what is open at the end is closed."""
+    for name in (FILE, "views.json"):
+        (baked_box / name).unlink(missing_ok=True)
+    opened = open_store(baked_box, "walk", screen)
+    state = opened.state
+    edits = state.materials.edits
+    edits.change("red", edits.scene["red"].model_copy(update={"kd": BLUE}))
+    edits.end_stroke()
+    state.navigation.camera = replace(state.navigation.camera, name="free", position=(0.1, 0.5, 2.2))
+    state.selection.choose("left")
+    state.look.exposure_ev, state.meter.expose_wanted = -1.0, False
+    found = [opened]
+    yield found
+    found[-1].drawing.close()
+    found[-1].close()
+
+
+def enter(found):
+    """The mode that the window enters, in place of the present one."""
+    wanted, found[-1].screen.enter = found[-1].screen.enter, None
+    found.append(wanted(found[-1]))
+    return found[-1]
+
+
+def test_there_and_back(mode, baked_box):
+    walk = mode[0]
+    edit_view(walk.state)
+    view = enter(mode)
+    assert isinstance(view, EditMode) and view.drawing.device is walk.drawing.device
+    document = view.state.session.document
+    assert document.camera == read_views(baked_box).cameras[0] and document.camera.position == (0.1, 0.5, 2.2)
+    width, height = document.size
+    assert width / height == pytest.approx(4 / 3, rel=0.01) and 0.98 < width * height / 512**2 < 1.02
+    assert view.state.material == "red" and view.state.look.exposure_ev == -1.0
+    assert document.materials["red"].source.material.kd == BLUE
+    view.state.session.pull("red", "diffuse", LOW, y=-0.5)
+    view.state.enter_room()
+    assert "not shown in the room: red" in view.screen.messages[-1].text
+    back = enter(mode)
+    assert isinstance(back, WalkMode) and back.state.navigation.camera == document.camera
+    assert back.state.selection.name == "left" and back.state.look.exposure_ev == -1.0
+    edits = back.state.materials.edits
+    assert edits.current("red").kd == BLUE and edits.can_undo
+    edits.undo()
+    assert "red" not in edits.edited, "one history before and after"
+    edits.redo()
+    edit_view(back.state)
+    again = enter(mode)
+    assert len(read_views(baked_box).cameras) == 1, "the view is a camera already"
+    assert again.state.session.document.materials["red"].curves and again.state.session.document.size == (width, height)
+
+
+def test_what_the_room_shows_of_the_edits_is_a_step_that_can_be_undone(mode, baked_box):
+    edit_view(mode[0].state)
+    view = enter(mode)
+    keeper, session = view.state.files.keeper, view.state.session
+    session.pull("red", "diffuse", LOW, y=-0.5)
+    assert keeper.unshown == ["red"]
+    green = session.document.materials["green"].source.material
+    keeper.show_in_room("red", green)
+    view.state.enter_room()
+    back = enter(mode)
+    edits = back.state.materials.edits
+    assert edits.current("red") == green
+    edits.undo()
+    assert edits.current("red").kd == BLUE
+    edits.redo()
+    edit_view(back.state)
+    again = enter(mode)
+    assert again.state.session.document.materials["red"].curves and again.state.files.keeper.unshown == []
+
+
+def test_a_view_that_cannot_be_edited_leaves_the_window_in_the_room(mode, monkeypatch):
+    def refused(*_, **__):
+        raise UserError("the scene is gone", file="scene.toml")
+
+    monkeypatch.setattr("lambent.viewer.modes.edit.start", refused)
+    edit_view(mode[0].state)
+    back = enter(mode)
+    assert isinstance(back, WalkMode) and back is not mode[0] and back.state.selection.name == "left"
+    assert "edit: scene.toml: the scene is gone" in back.screen.messages[-1].text
+
+
+def test_what_would_be_lost_keeps_the_window_in_the_room(mode):
+    state = mode[0].state
+    state.recordings.record()
+    for k in range(10):
+        state.navigation.camera = replace(state.navigation.camera, position=(0.1 * k, 0.5, 2.0))
+        state.recordings.recorder.take(state.navigation.camera, 0.1 * k)
+    edit_view(state)
+    assert state.screen.enter is None and "the recorded walk" in state.screen.messages[-1].text
+    state.recordings.drop()
+
+
+def test_a_view_starts_from_the_scene_where_the_room_is_as_baked(mode):
+    mode[0].state.materials.edits.undo()
+    edit_view(mode[0].state)
+    view = enter(mode)
+    of_scene = view.state.subject.scene.materials["red"]
+    assert view.state.session.document.materials["red"].source == OfDocument(material=of_scene)
+
+
+@pytest.mark.slow
+def test_a_window_enters_a_view_and_returns(open_window, baked_box, tmp_path):
+    for name in (FILE, "views.json"):
+        (baked_box / name).unlink(missing_ok=True)
+    window = open_window(baked_box, tmp_path, (1000, 700))
+    before = window.state()["camera"]
+    window.click(*window.point("edit this view"))
+    window.wait_for(lambda state: "trouble" in state)
+    window.settle()
+    window.click(*window.point("walk from here"))
+    seen = window.wait_for(lambda state: "trouble" not in state)
+    assert seen["camera"] == before
+    window.settle()
+    assert window.close() == 0
+    assert read_session(baked_box / FILE).view.camera.name == before["name"]
