@@ -201,67 +201,31 @@ class WalkMode(Mode):
 
 def panels(state: WalkState, falling: FallingLight | None, finishes: Finishes) -> tuple[Panel, ...]:
     """Panels of the column, sorted into the sizes of the window."""
-    about = (state.missing, state.scene.warnings)
     light_on_it = partial(metering.draw_falling, falling, state)
     of_lamps = SizedPanel("Lamps", partial(lamps.draw, state.lamps), "move, aim and exchange a lamp of the scene")
     return (
-        SizedPanel(
-            "Material",
-            partial(material.draw, state, finishes),
-            "the objects, and the material of the selected one",
-            opened=True,
-        ),
+        SizedPanel("Material", partial(material.draw, state, finishes), "the selected object, its material", True),
         SizedPanel("Curves", CurvesPanel(state).draw, "pull the curves of the selected material"),
-        SizedPanel(
-            "Light on it",
-            light_on_it,
-            "illuminance on the selected object, by light group",
-            opened=True,
-            sizes=("design",),
-        ),
-        SizedPanel(
-            "Light",
-            lambda: lights.draw(state.lights, state.recordings, in_numbers=state.screen.size == "measure"),
-            "each group of lamps: on or off, brightness, colour",
-        ),
+        SizedPanel("Light on it", light_on_it, "illuminance on the selected object, by group", True, ("design",)),
+        SizedPanel("Light", partial(lights.draw, state), "each group of lamps: on or off, brightness, colour"),
         *([of_lamps] if state.lamps.records else []),
-        SizedPanel("View", partial(view.draw, state), "what the picture shows, and its exposure", opened=True),
-        SizedPanel(
-            "Scene",
-            partial(scene.draw, state.navigation, state.recordings, *about),
-            "navigation, cameras, saved views and walks",
-            opened=True,
-        ),
-        SizedPanel(
-            "States",
-            partial(states.draw, state.states, state.comparison, state.screen),
-            "store the room's state, restore it, compare states",
-        ),
-        SizedPanel(
-            "Film",
-            partial(film.draw, state.films, state.recordings, state.navigation, state.screen),
-            "a film along the chosen camera path",
-        ),
-        *(SizedPanel(*of, sizes=("measure",)) for of in numbers(state, light_on_it)),
+        SizedPanel("View", partial(view.draw, state), "what the picture shows, and its exposure", True),
+        SizedPanel("Scene", partial(scene.draw, state), "navigation, cameras, saved views and walks", True),
+        SizedPanel("States", partial(states.draw, state), "store the room's state, restore it, compare states"),
+        SizedPanel("Film", partial(film.draw, state), "a film along the chosen camera path"),
+        *(SizedPanel(*one, sizes=("measure",)) for one in numbers(state, light_on_it)),
         SizedPanel("Help", partial(rows, SHORTCUTS, "shortcuts"), "mouse and keys"),
     )
 
 
 def numbers(state: WalkState, light_on_it: Callable[[], None]) -> tuple[tuple[str, Callable[[], None], str], ...]:
     """Titles, drawing and meaning of the panels of numbers and settings."""
+    cost = lambda: statistics.draw(state.screen, state.materials.editor, state.notes)  # noqa: E731
     return (
         ("Camera", partial(view.draw_camera, state), "field of view, walking speed, and marks over the picture"),
         ("Drawing", partial(view.draw_drawing, state), "how reflections are drawn, and how fast"),
         ("Light field", partial(light_field.draw, state), "points around the selected object and their maps"),
-        (
-            "Light meter",
-            partial(metering.draw, state.meter, state.look, light_on_it),
-            "illuminance on the selected object, luminance of the picture, glare",
-        ),
+        ("Light meter", partial(metering.draw, state, light_on_it), "illuminance, luminance and glare in numbers"),
         ("Compare", partial(compare.draw, state.comparison), "the picture compared with another"),
-        (
-            "Statistics",
-            lambda: statistics.draw(state.screen, state.materials.editor, state.notes),
-            "cost of the last frame, and noise of the light map",
-        ),
+        ("Statistics", cost, "cost of the last frame, and noise of the light map"),
     )

@@ -5,22 +5,21 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from lambent.core.plain import plain_name
-from lambent.viewer.cameras.navigation import Navigation
 from lambent.viewer.modes.walk.rebake.rebaking import clock_time
-from lambent.viewer.modes.walk.views.filming import FPS, QUALITIES, SIZES, Filming, Films
-from lambent.viewer.modes.walk.views.recording import Recordings
+from lambent.viewer.modes.walk.state import WalkState
+from lambent.viewer.modes.walk.views.filming import FPS, QUALITIES, SIZES, Filming
 from lambent.viewer.panels.widgets import choice, path_field, press
-from lambent.viewer.screen import Screen
 
 
-def draw(films: Films, recordings: Recordings, navigation: Navigation, screen: Screen) -> None:
+def draw(state: WalkState) -> None:
+    films = state.films
     if films.under_way is not None:
         if _progress(films.under_way):
             films.under_way.cancel()
-            screen.say(f"film cancelled after {films.under_way.done} frames")
+            state.screen.say(f"film cancelled after {films.under_way.done} frames")
             films.under_way = None
         return
-    paths, followed = recordings.paths, navigation.path
+    paths, followed = state.recordings.paths, state.navigation.path
     if not paths:
         imgui.text_wrapped("No camera path: record one in the Scene panel.")
         return

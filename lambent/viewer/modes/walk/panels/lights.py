@@ -11,7 +11,7 @@ from lambent.realtime.light.group_arrays import BAKE_GROUPS, FIELDS_FOLLOW, NO_G
 from lambent.store.light_groups import LightGroupRecord
 from lambent.viewer.cameras.navigation import PathPlay
 from lambent.viewer.modes.walk.light.light_keys import key_times
-from lambent.viewer.modes.walk.light.lights import Lights
+from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.modes.walk.views.recording import Recordings
 from lambent.viewer.panels.widgets import check, explain, press, px, slider, swatch, wrapped
 
@@ -21,8 +21,9 @@ WARM_K, COOL_K = 1800.0, 12000.0  # range of the slider
 USUAL_K = 6500.0
 
 
-def draw(lights: Lights, recordings: Recordings, *, in_numbers: bool) -> None:
-    """Draw the panel; `in_numbers` adds each group's share of all light."""
+def draw(state: WalkState) -> None:
+    """Draw the panel; in the size *measure* with each group's share of all light."""
+    lights, recordings, in_numbers = state.lights, state.recordings, state.screen.size == "measure"
     if not lights.groups:
         wrapped([f"{NO_GROUPS}: {BAKE_GROUPS}"])
         return

@@ -48,8 +48,9 @@ def _said(lx: float) -> str:
     return f"{float(f'{lx:.3g}'):,.0f}" if lx >= 100 else f"{lx:.3g}"
 
 
-def draw(meter: Meter, look: Look, light_on_it: Callable[[], None]) -> None:
+def draw(state: WalkState, light_on_it: Callable[[], None]) -> None:
     """Draw the panel, with the illuminance on the selected object."""
+    meter, look = state.meter, state.look
     light_on_it()
     imgui.separator()
     _glare(meter.glare)

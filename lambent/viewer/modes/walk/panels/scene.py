@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from imgui_bundle import imgui
 
 from lambent.viewer.cameras.navigation import Navigation
+from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.modes.walk.views.recording import Recordings
 from lambent.viewer.modes.walk.views.views import Kind
 from lambent.viewer.panels.widgets import check, explain, listed, path_field, press, slider, wrapped
@@ -18,8 +17,8 @@ UNFOLDS = "shows what the loader said about the scene file"
 WARNINGS = 3  # more warnings are folded, to keep the panels below in sight
 
 
-def draw(navigation: Navigation, recordings: Recordings, missing: Sequence[str], warnings: Sequence[str]) -> None:
-    """Draw the panel; `missing`: lines on data that the store lacks, `warnings`: from the scene's loader."""
+def draw(state: WalkState) -> None:
+    navigation, recordings, warnings = state.navigation, state.recordings, state.scene.warnings
     _movement(navigation)
     if recordings.cameras:
         _cameras(navigation, recordings)
@@ -28,7 +27,7 @@ def draw(navigation: Navigation, recordings: Recordings, missing: Sequence[str],
     if recordings.paths:
         _follow(recordings)
     _record(recordings)
-    wrapped(missing)
+    wrapped(state.missing)
     if len(warnings) <= WARNINGS:
         wrapped(warnings)
     elif imgui.tree_node(f"{len(warnings)} notes on the scene file###warnings"):

@@ -6,22 +6,22 @@ from imgui_bundle import imgui
 
 from lambent.core.errors import UserError
 from lambent.store.kept.session import RoomState
-from lambent.viewer.modes.walk.comparison import Comparison
 from lambent.viewer.modes.walk.session.states import BAKED, States
+from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.panels.widgets import check, path_field, press
-from lambent.viewer.screen import Screen
 
 HINT = "name of this state..."
 
 
-def draw(states: States, comparison: Comparison, screen: Screen) -> None:
+def draw(state: WalkState) -> None:
+    states = state.states
     meaning = "stores the present materials and light under this name; replaces a state of the same name"
     states.typed_name, wanted = path_field("state name", states.typed_name, "store", HINT, meaning)
     if wanted:
         try:
             states.store()
         except UserError as error:
-            screen.say(str(error))
+            state.screen.say(str(error))
     for name, room in states.all.items():
         _row(states, name, room, name)
         if name != BAKED:
@@ -36,8 +36,8 @@ def draw(states: States, comparison: Comparison, screen: Screen) -> None:
     split = check("split view", states.split, "shows the room left of a divider and another state right of it")
     if split != states.split:
         states.split = split
-    if states.split and comparison.on:
-        comparison.mode = "off"  # a picture has only one divider
+    if states.split and state.comparison.on:
+        state.comparison.mode = "off"  # a picture has only one divider
     imgui.same_line()
     if press("swap", "swaps the room with the state beside it (X)"):
         states.exchange()
