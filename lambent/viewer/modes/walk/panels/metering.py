@@ -20,6 +20,7 @@ from lambent.viewer.panels.widgets import explain, press, rows
 from lambent.viewer.screen import Rect
 
 GRAPH_PX = 90
+AS_BAKED = "as baked: only light groups (`lambent bake --light-groups scene`) follow edits here"
 
 
 def draw_falling(falling: FallingLight | None, state: WalkState) -> None:
@@ -39,8 +40,10 @@ def draw_falling(falling: FallingLight | None, state: WalkState) -> None:
         table += [(name, f"{_said(lx)} lx, {100 * lx / total if total else 0:.0f} %") for name, lx in by_group.items()]
     rows(table, "falling")
     explain("illuminance on the lit side; 5 % of the surface gets less than the first, 5 % more than the second number")
-    if found.note:
-        imgui.text_wrapped(found.note)
+    stays = not state.lights.groups and (edits.edited or edits.room.lamps)
+    for note in (found.note, AS_BAKED if stays else ""):
+        if note:
+            imgui.text_wrapped(note)
 
 
 def _said(lx: float) -> str:

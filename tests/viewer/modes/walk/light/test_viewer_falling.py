@@ -134,3 +134,9 @@ def test_the_panel_says_it(monkeypatch, state, room):
     falling._work.wait()
     metering.draw_falling(falling, state)
     assert ("on average", "716 lx") in drawn
+    monkeypatch.setattr(metering.imgui, "text_wrapped", drawn.append)
+    metering.draw_falling(falling, state)
+    assert metering.AS_BAKED not in drawn
+    state.materials.edits.change("brass", state.materials.edits.scene["plaster"])
+    metering.draw_falling(falling, state)
+    assert metering.AS_BAKED in drawn
