@@ -35,18 +35,14 @@ from lambent.viewer.screen import Screen
 
 @dataclass
 class Selection:
-    """The selected object `name`; `reveal`: the list of objects must scroll to it.
-
-    Selected objects are whole, even if the bake has cut them into parts.
-    """
+    """The selected object `name`: whole, even if the bake has cut it into parts."""
 
     objects: tuple[ObjectRecord, ...]
     name: str | None = None
-    reveal: bool = False
     pointed: Triple | None = None  # the clicked point, if it is the centre of orbit instead of the object's middle
 
     def choose(self, name: str | None, pointed: Triple | None = None) -> None:
-        self.name, self.reveal, self.pointed = name, name is not None, pointed
+        self.name, self.pointed = name, pointed
 
     @property
     def record(self) -> ObjectRecord | None:
