@@ -119,7 +119,7 @@ class WalkMode(Mode):
 
     @property
     def side_plots(self) -> SidePlots | None:
-        return side_plots(self.state.materials.editor)
+        return side_plots(self.state.materials.editor) if self.screen.size == "measure" else None
 
     @property
     def moving(self) -> bool:

@@ -102,3 +102,11 @@ def test_a_file_that_cannot_be_read_is_named(mode, state, tmp_path, text):
 
 def test_a_room_without_lamps_says_so(mode, tmp_path):
     assert dropping.NO_LAMPS in drop(mode, tmp_path / "wide.LDT", TABLE)
+
+
+def test_an_open_editor_and_its_plots_are_for_measuring(mode, state, measurement_file):
+    drop(mode, measurement_file, TABLE)
+    assert mode.side_plots is not None
+    state.screen.size = "design"
+    assert mode.side_plots is None and state.materials.editor is not None
+    state.materials.close_editor()

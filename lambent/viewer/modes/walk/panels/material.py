@@ -21,26 +21,37 @@ NOTHING = "nothing"
 
 def draw(state: WalkState, finishes: Finishes) -> None:
     """Draw the panel of the present size of the window."""
-    selection, materials = state.selection, state.materials
-    _object(selection)
-    name, editor = selection.material, materials.editor
+    materials, name = state.materials, state.selection.material
+    _object(state.selection)
     if name is None:
         imgui.text_wrapped("Click an object in the picture, or choose it above.")
-    elif editor is not None and editor.subject.name == name:
-        editing.draw_head(editor)
-        editing.draw(editor)
-        imgui.separator_text("fit")
-        editing.draw_fit(editor)
     elif state.screen.size == "measure":
-        _numbers(materials, name)
-        _texture(state.texturing, name)
-        imgui.separator()
-        _file(materials, name)
+        _in_numbers(state, name)
     else:
         _words(materials, name)
         _finishes(finishes, name)
         _texture(state.texturing, name)
         _reset(materials, name)
+
+
+def _in_numbers(state: WalkState, name: str) -> None:
+    """Draw every parameter, or the editor if it is open on this material."""
+    materials, editor = state.materials, state.materials.editor
+    if editor is not None and editor.subject.name == name:
+        editing.draw_head(editor)
+        editing.draw(editor)
+        imgui.separator_text("fit")
+        editing.draw_fit(editor)
+        return
+    material = materials.edits.current(name)
+    edited, materials.linked_roughness = parameters.edited(material, materials.linked_roughness)
+    if edited != material:
+        materials.edits.change(name, edited)
+    _texture(state.texturing, name)
+    imgui.separator()
+    _reset(materials, name)
+    _save(materials, name)
+    _compare(materials, name)
 
 
 def _object(selection: Selection) -> None:
@@ -99,24 +110,10 @@ def _ball(finishes: Finishes, finish: Finish, number: int, size: float) -> bool:
     return bool(pressed)
 
 
-def _numbers(materials: Materials, name: str) -> None:
-    edits = materials.edits
-    material = edits.current(name)
-    edited, materials.linked_roughness = parameters.edited(material, materials.linked_roughness)
-    if edited != material:
-        edits.change(name, edited)
-
-
 def _reset(materials: Materials, name: str) -> None:
     edits = materials.edits
     changed = name in edits.edited or name in edits.room.textures
     buttons([("reset", changed, partial(edits.reset, name), "restores the store's material")])
-
-
-def _file(materials: Materials, name: str) -> None:
-    _reset(materials, name)
-    _save(materials, name)
-    _compare(materials, name)
 
 
 def _texture(texturing: Texturing, name: str) -> None:

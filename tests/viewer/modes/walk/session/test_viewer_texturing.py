@@ -1,6 +1,5 @@
 """The texture of a material exchanged in the window: choice, image, undo, session, and what is refused."""
 
-
 import numpy as np
 import pytest
 from PIL import Image
