@@ -152,7 +152,8 @@ class KeptView(Strict):
 class EditedView(Strict):
     """A view whose materials are edited in place: a `lambent.editing` session document, of files by the store's folder.
 
-    `room` has the materials of the current state then, which the document started from; those of `shown` show its edits.
+    `room` has the materials of the current state then, which the document started from; `shown` are names of materials
+    that the current state shows as edited.
     """
 
     document: dict[str, Any]
@@ -215,5 +216,9 @@ def session_from(said: Any, file: Path) -> WalkSession:
 
 
 def write_session(file: Path, session: WalkSession) -> None:
-    """Write a session, atomically; raises `UserError` on failure."""
-    write_text(file, json.dumps(session.model_dump(mode="json"), indent=1) + "\n")
+    """Write a session, atomically; raises `UserError` on failure, and if `read_session` would refuse the file."""
+    text = json.dumps(session.model_dump(mode="json"), indent=1) + "\n"
+    if (size := len(text.encode())) > SESSION_BYTES:
+        raise UserError("session is too large", file=file, got=f"{size} bytes", expected=f"at most {SESSION_BYTES}")
+    session_from(parse_json(text.encode(), file), file)
+    write_text(file, text)

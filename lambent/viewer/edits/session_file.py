@@ -108,6 +108,8 @@ class SessionFile:
         if self._work is None and self._is_due:
             self._hurry.clear()
             self._work = Work(lambda _: self._write_soon(), self._done, self._failed, self._screen.wake)
+        elif self._latest == self._written:
+            self.fault = ""  # of a change that was undone
 
     @property
     def _is_due(self) -> bool:

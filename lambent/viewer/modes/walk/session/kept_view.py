@@ -6,6 +6,9 @@ from collections.abc import Collection
 from functools import partial
 from typing import TYPE_CHECKING
 
+from pydantic import ValidationError
+
+from lambent.core.errors import UserError
 from lambent.realtime.planar.planar_integrators import CHOICES as PLANARS
 from lambent.store.kept.session import KeptLook, KeptView
 from lambent.viewer.cameras.navigation import Movement
@@ -19,15 +22,22 @@ CHOICES = {
 }  # fmt: skip
 
 
-def view_of(state: WalkState) -> KeptView:
-    """The view that a window shows."""
+def view_of(state: WalkState) -> KeptView | None:
+    """The view that a window shows; the opened one while a number is beyond what a session may have."""
+    try:
+        return _view_of(state)
+    except (UserError, ValidationError):
+        return state.session.opened.view
+
+
+def _view_of(state: WalkState) -> KeptView:
     navigation, place, look = state.navigation, state.screen.picture, state.look
     kept = {name: getattr(look, name) for name in KeptLook.model_fields} | {"lookups": dict(look.lookups)}
     if state.meter.expose_wanted:  # no exposure yet
         kept |= {"exposure_ev": None, "base_ev": None}
     return KeptView(
         camera=navigation.camera, movement=navigation.movement, flying=navigation.flying,
-        speed_m_s=navigation.walker.speed_m_s, eye_height_m=navigation.walker.eye_height_m,
+        speed_m_s=navigation.walker.speed_m_s or None, eye_height_m=navigation.walker.eye_height_m or None,
         size=(max(1, place.width), max(1, place.height)),
         look=KeptLook(**kept),
         traces=state.screen.pace.traces, light_follows=state.answering.on, rebaked=state.rebaking.copied,

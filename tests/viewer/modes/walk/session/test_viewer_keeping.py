@@ -433,6 +433,38 @@ def test_an_exposure_that_was_not_metered_yet_is_metered_again(state):
     assert state.meter.expose_wanted
 
 
+def test_numbers_that_no_session_may_have_leave_the_opened_view(state):
+    """As the exposure of a picture that is nearly black, or a range of false colours that is empty."""
+    state.session.opened = WalkSession(view=VIEW)
+    state.look.exposure_ev = 90.0
+    assert view_of(state) == VIEW
+    state.look.exposure_ev, state.look.scale = 1.0, Range(5.0, 5.0)
+    assert view_of(state) == VIEW
+    state.look.scale, state.navigation.walker.eye_height_m, state.navigation.walker.speed_m_s = Range(), 0.0, 0.0
+    found = view_of(state)
+    assert found.look.exposure_ev == 1.0 and found.eye_height_m is None, "a scene without height"
+
+
+def test_what_could_not_be_read_is_not_written(window, tmp_path):
+    window.paint(RED)
+    window.rest()
+    before = (tmp_path / FILE).read_bytes()
+    broken = Material.model_construct(**{**RED.model_dump(), "kd": (float("nan"),) * 3})
+    window.paint(broken)
+    window.rest()
+    assert (tmp_path / FILE).read_bytes() == before and "the session is not kept" in window.keeper.fault
+    window.edits.undo()
+    window.rest()
+    assert window.keeper.fault == ""
+
+
+def test_a_session_that_is_too_large_is_not_written(window, tmp_path, monkeypatch):
+    monkeypatch.setattr("lambent.store.kept.session.SESSION_BYTES", 100)
+    window.paint(RED)
+    window.rest()
+    assert "session is too large" in window.keeper.fault and not (tmp_path / FILE).exists()
+
+
 def test_orbit_that_was_asked_for_stays(state):
     state.navigation.movement = "orbit"
     show_view(state, VIEW.model_copy(update={"movement": "walk"}))
