@@ -169,7 +169,7 @@ WINDOW_SAMPLES = 6  # denoised, of the pictures at rest
 WINDOWS = {  # by size: a key, a place to click, panels to open
     "show": ("1", None, ()),
     "design": ("2", (560, 560), ()),
-    "measure": ("3", (520, 420), ("View", "Scene", "Light meter", "Statistics")),
+    "measure": ("3", (300, 600), ("View", "Scene", "Light meter", "Statistics")),
 }
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.plain import Triple, triple
 from lambent.core.views.camera import Camera, rays_through
+from lambent.materials.clear import clear_terms
 from lambent.store.contract import ObjectRecord
 from lambent.viewer.cameras import cameras
 from lambent.viewer.cameras.framing import framed
@@ -61,6 +62,7 @@ LARGE = 0.5  # radius / distance of objects from which on orbit turns about the 
 PIECE_PX = 12.0  # length of the pieces of a drag in orbit that are checked for walls
 STEPS = {"+": 1, "=": 1, "-": -1}  # of the exposure, 1/3 EV
 DROP_PX = 60.0  # from a lamp to where a file is dropped onto it
+PANES = 20  # of clear glass that the sky is looked for behind
 FOV_DEG = (10.0, 120.0)
 NOTCH_S = 0.15  # of walking, for a notch of the wheel
 PAD_PX_S, PAD_NOTCHES_S = 400.0, 6.0  # of a drag that turns as a whole deflection does; of a wheel
@@ -186,9 +188,18 @@ class WalkInput(Input):
 
     @property
     def is_over_sky(self) -> bool:
-        """Whether the mouse is over the picture, and over no object there."""
-        cursor, place = self._state.meter.cursor, self.screen.picture
-        return cursor is not None and self._under(cursor[0] * place.width, cursor[1] * place.height)[0] is None
+        """Whether the mouse is over the picture, and over nothing but clear glass there."""
+        if (cursor := self._state.meter.cursor) is None:
+            return False
+        camera, place = self.navigation.camera, self.screen.picture
+        towards = rays_through(camera, cursor[0] * place.width, cursor[1] * place.height, place.width, place.height)
+        found, distance_m, eye = None, 0.0, np.array(camera.position)
+        for _ in range(PANES):
+            found, distance_m = self._geometry.hit(eye, towards)
+            if found is None or clear_terms(self._state.materials.edits.current(found.material)) is None:
+                break
+            eye = eye + (distance_m + cameras.NEAREST_M / 10) * towards
+        return found is None
 
     def select_under_cursor(self) -> None:
         """Select the object under the mouse; keep the selection where there is none."""

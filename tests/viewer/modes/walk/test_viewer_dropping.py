@@ -89,6 +89,15 @@ def test_a_sky_is_baked_and_over_an_object_the_picture_is_its_texture(mode, stat
     assert "is the texture of brass" in drop(mode, tmp_path / name, TABLE)
 
 
+def test_the_sky_behind_clear_glass_is_the_sky(mode, state):
+    state.meter.cursor = 0.5, 0.6  # on the table, from which the ray reaches the floor
+    edits, lobe = state.materials.edits, Lobe(side="transmission", mx=0.001, my=0.001, r0=0.04)
+    edits.change("brass", Material(name="brass", kd=0, lobes=(lobe,)))
+    assert not mode.input.is_over_sky, "the floor is behind the table"
+    edits.change("plaster", Material(name="plaster", kd=0, lobes=(lobe,)))
+    assert mode.input.is_over_sky
+
+
 @pytest.mark.parametrize("text", [None, "{", '{"format": "something"}'])
 def test_a_file_that_cannot_be_read_is_named(mode, state, tmp_path, text):
     file = tmp_path / "odd.json"
