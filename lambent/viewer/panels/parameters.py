@@ -39,20 +39,20 @@ def in_words(material: Material, first: Material) -> Material:
     changes: dict[str, object] = {"kd": swatch("colour", material.kd, "colour of the matte part")}
     if any(material.kt_d):
         changes["kt_d"] = swatch("light let through", material.kt_d, "colour of the light that shines through")
-    if material.lobes:
-        changes["lobes"] = _lobes_in_words(material, first)
+    imgui.begin_disabled(not material.lobes)  # drawn all the same, so that nothing below moves
+    changes["lobes"] = _lobes_in_words(material, first)
+    imgui.end_disabled()
     return material.model_copy(update=changes)
 
 
 def _lobes_in_words(material: Material, first: Material) -> tuple[Lobe, ...]:
-    whole = _shine(first) or _shine(material) or 1.0
-    shine, brightest = 100 * _shine(material) / whole, max(material.lobes, key=lambda lobe: sum(lobe.k))
-    rough = 100 * math.sqrt(math.sqrt(brightest.mx * brightest.my))
+    lobes, whole = material.lobes, _shine(first) or _shine(material) or 1.0
+    brightest = max(lobes, key=lambda lobe: sum(lobe.k), default=Lobe(mx=1.0, my=1.0))
+    shine, rough = 100 * _shine(material) / whole, 100 * math.sqrt(math.sqrt(brightest.mx * brightest.my))
     meaning = "brightness of reflections; 100 % as opened"
     shine_now = slider("shine", shine, 0.0, MOST_SHINE, meaning, unit=" %%", digits=0)
     meaning = "width of reflections, from a mirror to matte"
     rough_now = slider("roughness", rough, *ROUGH, meaning, unit=" %%", digits=0)
-    lobes = material.lobes
     if shine_now != shine and shine > 0:
         factor = max(shine_now, LEAST_SHINE) / shine
         lobes = tuple(lobe.model_copy(update={"k": triple(factor * np.array(lobe.k))}) for lobe in lobes)

@@ -104,7 +104,10 @@ def test_the_design_size_changes_colour_shine_and_roughness(monkeypatch, state, 
     window.drag("shine", 0.5, 0.25)
     dim = state.materials.edits.current("brass").lobes[0]
     assert np.divide(dim.k, rough.k) == pytest.approx([0.5] * 3, abs=0.05) and dim.mx == rough.mx
+    places = dict(window.rects)
     window.click("##finish 0")
+    window.frame()
+    assert window.rects["##finish 1"] == places["##finish 1"], "nothing moves under the mouse"
     assert state.materials.edits.current("brass").lobes == (), "plaster is matte"
     window.click("reset")
     assert state.materials.edits.edited == {}
@@ -114,6 +117,8 @@ def test_the_design_size_changes_colour_shine_and_roughness(monkeypatch, state, 
 def test_words_leave_an_untouched_material_bit_equal(monkeypatch):
     """Also one beyond the range of the sliders, and one without shine."""
     seen = {}
+    for name in ("begin_disabled", "end_disabled"):
+        monkeypatch.setattr(parameters.imgui, name, lambda *args: None)
     monkeypatch.setattr(parameters, "swatch", lambda label, value, meaning: value)
     monkeypatch.setattr(parameters, "slider", lambda label, value, *rest, **kw: seen.setdefault(label, value))
     lobes = (Lobe(k=(3, 2, 0.1), mx=0.037, my=3.9), Lobe(k=0.2, mx=0.001, my=0.001))
