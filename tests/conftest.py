@@ -19,6 +19,12 @@ settings.load_profile("unhurried")
 SHARED = Path(os.environ.get("LAMBENT_SHARED", Path(__file__).parents[2] / "shared" / "data"))
 
 
+@pytest.fixture(scope="session", autouse=True)
+def settings_of_no_user(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Windows of tests start as on a new computer, and leave the user's own settings alone."""
+    os.environ["XDG_CONFIG_HOME"] = str(tmp_path_factory.mktemp("config"))
+
+
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Folder of real measured files, environments and scenes; tests that need it skip where it is absent."""
