@@ -8,7 +8,8 @@ because retro-reflectors lose light towards grazing.
 
 Curves (version 2): a lobe of the distribution "curve" has its `shape`, the relative density of slopes at SHAPE_NODES
 radii (`slope_curve`). `fresnel` is the Fresnel reflectance of each channel at COSINE_NODES values of cos_d, and
-`kd_curve` a factor of kd in cos_i and in cos_o, both evenly spaced from 0 to 1 and linear between. A document without
+`kd_curve` a factor of kd in cos_i and in cos_o, both evenly spaced from 0 to 1 and between nodes linear in the fifth
+power of 1 - cosine. A document without
 curves is written as version 1.
 """
 

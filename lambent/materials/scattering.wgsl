@@ -48,11 +48,15 @@ fn lambent_sample_half_vector(u: vec2f, lobe: LambentLobe) -> vec3f {
     return lambent_from_slopes(r * vec2f(lobe.mx * cos(phi), lobe.my * sin(phi)));
 }
 
-// RGB at a cosine in [0, 1] of a curve of evenly spaced nodes, whose rows begin at `first`.
+// RGB at a cosine in [0, 1] of a curve of evenly spaced nodes, whose rows begin at `first`; w: (1 - cosine)^5 there.
 fn lambent_at_cosine(first: u32, cosine: f32) -> vec3f {
-    let place = clamp(cosine, 0.0, 1.0) * f32(LAMBENT_COSINE_NODES - 1u);
-    let node = min(u32(place), LAMBENT_COSINE_NODES - 2u);
-    return mix(lambent_row(first + node).rgb, lambent_row(first + node + 1u).rgb, place - f32(node));
+    let c = clamp(cosine, 0.0, 1.0);
+    let node = min(u32(c * f32(LAMBENT_COSINE_NODES - 1u)), LAMBENT_COSINE_NODES - 2u);
+    let low = lambent_row(first + node);
+    let high = lambent_row(first + node + 1u);
+    let m = 1.0 - c;
+    let m2 = m * m;
+    return mix(low.rgb, high.rgb, (low.w - m2 * m2 * m) / (low.w - high.w));
 }
 
 // k times Fresnel: F for reflection (3.4), 1 - F for transmission (3.5).

@@ -30,6 +30,8 @@ LEAST_DENSITY = 1e-30  # of the largest
 
 NODES_RHO = CORE * np.sinh(STEP * np.arange(SHAPE_NODES))
 NODES_LOG = np.log1p(NODES_RHO**2)
+NODES_COSINE = np.linspace(0, 1, COSINE_NODES)
+WEIGHTS = tuple(((1 - NODES_COSINE) ** 5).tolist())
 
 
 @lru_cache(maxsize=512)
@@ -75,17 +77,19 @@ def quantile(mass: Any, shape: tuple[float, ...], ops: Any) -> Any:
 
 @lru_cache(maxsize=512)
 def normalised(nodes: tuple[float, ...]) -> tuple[float, ...]:
-    """A curve over the cosine mu with 2 integral of c(mu) mu dmu = 1: nodes evenly spaced in [0, 1], linear between."""
-    c, step = np.asarray(nodes), 1 / (len(nodes) - 1)
-    mu = np.linspace(0, 1, len(nodes))[:-1]
-    mean = (step * (mu * (c[:-1] + c[1:]) + step * (c[:-1] + 2 * c[1:]) / 3)).sum()
+    """A curve over the cosine mu, as `at_cosine` has it, with 2 integral of c(mu) mu dmu = 1."""
+    c, m = np.asarray(nodes), 1 - NODES_COSINE
+    rise = np.diff(c) / np.diff(m**5)
+    flat = (c[:-1] - rise * m[:-1] ** 5) * np.diff(NODES_COSINE**2)
+    mean = (flat - 2 * rise * np.diff(m**6 / 6 - m**7 / 7)).sum()
     return tuple((c / mean).tolist())
 
 
 def curve_rows(material: Material) -> tuple[Floats, list[tuple[int, int]], int]:
     """Rows (R, 4) of a material's curves for shaders; the first rows of shape and Fresnel of each lobe, and that of kd.
 
-    A row of a shape is a node of `slope_table`, a row of a curve over the cosine its RGB. A missing curve is at -1.
+    A row of a shape is a node of `slope_table`, a row of a curve over the cosine its RGB and (1 - cosine)^5. A missing
+    curve is at -1.
     """
     rows: list[Floats] = []
     count = 0
@@ -101,11 +105,12 @@ def curve_rows(material: Material) -> tuple[Floats, list[tuple[int, int]], int]:
     of_lobes = [
         (
             add(None if lobe.shape is None else slope_table(lobe.shape).reshape(-1, ROW)),
-            add(None if lobe.fresnel is None else np.pad(np.transpose(lobe.fresnel), ((0, 0), (0, 1)))),
+            add(None if lobe.fresnel is None else np.column_stack([np.transpose(lobe.fresnel), WEIGHTS])),
         )
         for lobe in material.lobes
     ]
-    of_kd = add(None if material.kd_curve is None else np.tile(np.array(normalised(material.kd_curve))[:, None], ROW))
+    nodes = material.kd_curve
+    of_kd = add(None if nodes is None else np.column_stack([np.tile(normalised(nodes), (3, 1)).T, WEIGHTS]))
     return np.concatenate([np.zeros((0, ROW)), *rows]), of_lobes, of_kd
 
 
@@ -127,8 +132,15 @@ def by_cosine(nodes: tuple[float, ...]) -> Floats:
 
 
 def at_cosine(cosine: Any, nodes: tuple[float, ...], ops: Any) -> Any:
-    """Value at a cosine in [0, 1] of a curve of COSINE_NODES nodes, linear between."""
-    table, place = by_cosine(nodes), ops.minimum(ops.maximum(cosine, 0.0), 1.0) * (COSINE_NODES - 1.0)
-    low = ops.minimum(ops.floor(place), COSINE_NODES - 2.0)
-    share, first = place - low, ops.whole(low)
+    """Value at a cosine in [0, 1] of a curve of COSINE_NODES nodes.
+
+    Between nodes it is linear in (1 - cosine)^5, so that Schlick's approximation is exact, and nothing overshoots.
+    """
+    table, weights = by_cosine(nodes), by_cosine(WEIGHTS)
+    cosine = ops.minimum(ops.maximum(cosine, 0.0), 1.0)
+    first = ops.whole(ops.minimum(ops.floor(cosine * (COSINE_NODES - 1.0)), COSINE_NODES - 2.0))
+    m = 1 - cosine
+    m2 = m * m
+    low, high = (ops.gather(weights, first + k) for k in (0, 1))
+    share = (low - m2 * m2 * m) / (low - high)
     return ops.gather(table, first) * (1 - share) + ops.gather(table, first + 1) * share

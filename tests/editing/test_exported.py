@@ -112,7 +112,7 @@ def test_a_curve_lobe_is_opened_and_closed_without_a_fit() -> None:
         angle = np.linspace(0, 1, len(values))[:, None]
         one.draw("it", name, Curve(values * (1 + (by - 1) * angle)))
     found = export(one, "it")
-    assert found.fitted == () and found.verdict.word == "faithful" and found.shares["l1"] < 0.01
+    assert found.fitted == () and found.verdict.word == "faithful" and found.shares["l1"] < 0.03
     again = session(found.material)
     assert export(again, "it").material.lobes == found.material.lobes
 

@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import direction
 from lambent.materials import lobes
-from lambent.materials.bsdf import MaterialBSDF, diffuse_seen, normalised
+from lambent.materials.bsdf import MaterialBSDF, diffuse_seen, normalised, under_fresnel
 from lambent.materials.document import COSINE_NODES, SHAPE_NODES, Lobe, Material, load_material, material_from
 from lambent.materials.lobes import NUMPY
 from lambent.materials.slope_curve import NODES_RHO, at_cosine, half_density, log_density, quantile
@@ -122,12 +122,22 @@ def test_curves_are_reciprocal(name: str) -> None:
     assert_reciprocal(MaterialBSDF(MATERIALS[name]))
 
 
-def test_fresnel_is_linear_between_its_nodes() -> None:
+def test_schlick_is_a_curve() -> None:
+    """Between nodes a curve is linear in (1 - cosine)^5: so are Schlick's F, and the coupling's transmittance."""
+    cosine, r0 = np.linspace(0, 1, 301), 0.04
+    nodes = tuple(lobes.fresnel(np.linspace(0, 1, COSINE_NODES), r0).tolist())
+    np.testing.assert_allclose(at_cosine(cosine, nodes, NUMPY), lobes.fresnel(cosine, r0), atol=1e-12)
+    seen = tuple(under_fresnel(np.linspace(0, 1, COSINE_NODES)).tolist())
+    np.testing.assert_allclose(at_cosine(cosine, seen, NUMPY), under_fresnel(cosine), atol=1e-12)
+
+
+def test_fresnel_runs_through_its_nodes_and_stays_between_them() -> None:
+    cosine = np.linspace(0, 1, COSINE_NODES)
     for channel, nodes in enumerate(FRESNEL):
-        cosine = np.array([0.0, 0.5 / 7, 1 / 7, 0.99, 1.0])
-        np.testing.assert_allclose(
-            lobes.reflectance(cosine, CURVED, channel), np.interp(cosine, np.linspace(0, 1, 8), nodes)
-        )
+        np.testing.assert_allclose(lobes.reflectance(cosine, CURVED, channel), nodes, atol=1e-12)
+        for low, high, at in zip(nodes, nodes[1:], cosine, strict=False):
+            between = lobes.reflectance(at + np.linspace(0.01, 0.13, 9), CURVED, channel)
+            assert (between >= min(low, high) - 1e-12).all() and (between <= max(low, high) + 1e-12).all()
     assert CURVED.r0 == tuple(nodes[-1] for nodes in FRESNEL)
 
 

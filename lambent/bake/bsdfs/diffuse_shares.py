@@ -11,7 +11,7 @@ import numpy as np
 
 from lambent.materials.bsdf import coupling, under_fresnel
 from lambent.materials.document import COSINE_NODES, Material
-from lambent.materials.slope_curve import normalised
+from lambent.materials.slope_curve import WEIGHTS, normalised
 
 
 class DiffuseShares:
@@ -20,6 +20,7 @@ class DiffuseShares:
     def __init__(self, materials: Sequence[Material]) -> None:
         self._coupled = mi.Bool(np.array([m.kd_coupled for m in materials], bool))
         curves = [normalised(m.kd_curve or (1.0,) * COSINE_NODES) for m in materials]
+        self._weights = mi.Float(np.array(WEIGHTS, np.float32))
         self._nodes = mi.Float(np.array(curves, np.float32).ravel()) if any(m.kd_curve for m in materials) else None
 
     def seen(self, number: Any, cosine: Any, active: Any) -> Any:
@@ -36,8 +37,11 @@ class DiffuseShares:
         return found * self._at(number, cos_i, active) * self._at(number, cos_o, active)
 
     def _at(self, number: Any, cosine: Any, active: Any) -> Any:
-        place = dr.clip(cosine, 0, 1) * (COSINE_NODES - 1)
-        low = dr.minimum(dr.floor(place), COSINE_NODES - 2)
-        first = number * COSINE_NODES + mi.UInt32(low)
-        below, above = (dr.gather(mi.Float, self._nodes, first + k, active) for k in (0, 1))
-        return dr.lerp(below, above, place - low)
+        """`slope_curve.at_cosine` of the material's curve."""
+        cosine = dr.clip(cosine, 0, 1)
+        first = mi.UInt32(dr.minimum(dr.floor(cosine * (COSINE_NODES - 1)), COSINE_NODES - 2))
+        low, high = (dr.gather(mi.Float, self._weights, first + k, active) for k in (0, 1))
+        below, above = (dr.gather(mi.Float, self._nodes, number * COSINE_NODES + first + k, active) for k in (0, 1))
+        m = 1 - cosine
+        m2 = m * m
+        return dr.lerp(below, above, (low - m2 * m2 * m) / (low - high))

@@ -59,6 +59,7 @@ fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
     let out = groups_out(lobe);
     let layer = u32(out);
     let mixed = fract(out);
+    let tint = tints(lobe, wo);
     var sum = vec3f(0.0);
     for (var i = 0u; i < LAYERS; i++) {
         let share = select(select(1.0 - mixed, mixed, i == 1u), 1.0, LAYERS == 1u);
@@ -67,7 +68,7 @@ fn integrate(index: u32, wo: vec3f, s: Surface) -> vec3f {
             let at = sample_about(wo, lambent_from_slopes(q.xy * here.growth));
             if (!at.seen) { continue; }
             let light = cleaned_light(s, on_side(lobe, at.wi), half_log2_omega(q, at, here), min(layer + i, textureNumLayers(cleaned_cubes) - 1u));
-            sum += share * q.w * gain(lobe, at.wi, wo, at.h) * light;
+            sum += share * q.w * sample_gain(tint, lobe, at, wo) * light;
         }
     }
     return sum * (albedo_factor(first + SAMPLES, wo.z) / f32(SAMPLES)) + lamps_light(lobe, wo, s, out);

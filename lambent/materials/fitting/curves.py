@@ -25,7 +25,7 @@ from lambent.materials.fitting.parameters import Box
 from lambent.materials.fitting.problem import ALPHA, Mixture, Problem
 from lambent.materials.fresnel import schlick_weight
 from lambent.materials.lobes import NUMPY
-from lambent.materials.slope_curve import NODES_LOG, NODES_RHO, ROW, normalised, quantile, slope_table
+from lambent.materials.slope_curve import NODES_COSINE, NODES_LOG, NODES_RHO, ROW, normalised, quantile, slope_table
 
 STRENGTHS = (1e-4, 1e-2, 1.0)  # of the penalty, in units of the start's error
 FOLDS = 5  # a fifth of the tuples is held out
@@ -103,9 +103,6 @@ def _hats(place: Floats, nodes: Floats) -> tuple[NDArray[np.int64], Floats]:
     return low, (place - nodes[low]) / (nodes[low + 1] - nodes[low])
 
 
-COSINES = np.linspace(0, 1, COSINE_NODES)
-
-
 class Terms:
     """The terms of a model at a block of tuples, with their derivatives by the unknowns."""
 
@@ -114,8 +111,8 @@ class Terms:
         mx, my = model.m * np.exp(-stretch / 2), model.m * np.exp(stretch / 2)
         x, y = block.slope_x2[0] / (mx * mx), block.slope_y2[0] / (my * my)
         self._slope2, self._difference = x + y, x - y
-        self._hats = [_hats(np.log1p(x + y), NODES_LOG), _hats(block.cos_d[0], COSINES)]
-        self._of_diffuse = [_hats(cosine, COSINES) for cosine in block.cosines]
+        self._hats = [_hats(np.log1p(x + y), NODES_LOG), _hats(-block.schlick[0], -schlick_weight(NODES_COSINE))]
+        self._of_diffuse = [_hats(-schlick_weight(c), -schlick_weight(NODES_COSINE)) for c in block.cosines]
         self._block, self._model, self.background = block, model, background
         log_p = _at(model.shape, self._hats[0]) + block.base[0] - 2 * np.log(model.m) - alpha * block.log_cosines
         self.lobe = np.exp(log_p + _at(model.tint, self._hats[1]))  # (C, N)
@@ -242,7 +239,7 @@ def start_of(problem: Problem, mixture: Mixture) -> CurveModel:
     """The mirroring lobes of a mixture as one: their densities add up, their other numbers are means by light."""
     lobes = [one for one in mixture.lobes if not one.retro]
     mx, my, r0, alpha = np.array([one.shape for one in lobes]).T
-    f = r0[:, None] + (1 - r0[:, None]) * schlick_weight(COSINES)
+    f = r0[:, None] + (1 - r0[:, None]) * schlick_weight(NODES_COSINE)
     f = f if problem.side == "reflection" else 1 - f
     k = np.array([np.maximum(one.k, 1e-9) for one in lobes])  # (L, C)
     light = k.mean(axis=1) * f[:, -1] / (k.mean(axis=1) * f[:, -1]).sum()

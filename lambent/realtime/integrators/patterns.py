@@ -26,6 +26,7 @@ RINGS: dict[int, tuple[int, ...]] = {
     1: (1,), 3: (3,), 5: (1, 4), 7: (1, 6), 9: (2, 7), 11: (1, 5, 5), 13: (1, 6, 6), 15: (1, 7, 7), 17: (1, 8, 8),
     19: (1, 6, 6, 6), 40: (1, 13, 13, 13),
 }  # fmt: skip
+LONG_TAILED = {7: (1, 3, 3), 9: (1, 4, 4)}  # of curve lobes, whose tails need a ring of their own
 N_MAX = 64
 LINE_RATIO, LINE_BLEND = 3.0, 4 / 3  # ratio of roughnesses where rings turn into a line, at n = 7; width of the blend
 CENTRE_WEIGHT, CENTRE_WEIGHT_FEW = 1.8, 1.3  # of the centre sample, relative to the mean; the latter below 7 samples
@@ -63,7 +64,7 @@ def ring_pattern(n: int, lobe: Lobe) -> Pattern:
     are the sharpest, but break the highlight of a small lamp into one piece per sample. Filters of `ring_bias` keep it
     nearly whole, and `ring_stretch` shrinks the rings to preserve the lobe's width.
     """
-    counts = ring_counts(n)
+    counts = LONG_TAILED.get(n, ring_counts(n)) if lobe.shape is not None else ring_counts(n)
     centred = counts[0] == 1 and n > 1
     centre = 0.0 if not centred else CENTRE_WEIGHT_FEW if n < 7 else CENTRE_WEIGHT
     weight = np.full(n, (n - centre) / (n - centred))

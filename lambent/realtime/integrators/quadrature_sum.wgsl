@@ -4,13 +4,14 @@
 
 fn quadrature_sum(here: LobeHere, first: u32, wo: vec3f, s: Surface) -> vec3f {
     let lobe = here.lobe;
+    let tint = tints(lobe, wo);
     var sum = vec3f(0.0);
     for (var k = 0u; k < SAMPLES; k++) {
         let q = samples[first + k];
         let at = sample_about(wo, lambent_from_slopes(q.xy * here.growth));
         if (!at.seen) { continue; }
         let light = incident(s, on_side(lobe, at.wi), half_log2_omega(q, at, here));
-        sum += q.w * gain(lobe, at.wi, wo, at.h) * light;
+        sum += q.w * sample_gain(tint, lobe, at, wo) * light;
     }
     return sum;
 }

@@ -145,6 +145,29 @@ fn gain(lobe: LambentLobe, wi: vec3f, wo: vec3f, h: vec3f) -> vec3f {
     return lambent_tint(dot(wo, h), lobe) * (wi.z / (lambent_cosine_power(wi, wo, lobe) * h.z));
 }
 
+// The tints of the fixed samples of a lobe, linear in cos_d: through the tints of half vectors one width of the lobe
+// before and behind the normal. Curves are looked up twice a lobe, not twice a sample.
+struct Tints {
+    middle: vec3f,
+    rise: vec3f,
+}
+
+fn tints(lobe: LambentLobe, wo: vec3f) -> Tints {
+    if !LAMBENT_CURVES { return Tints(); }
+    let reach = max(lobe.spread * sqrt(lobe.mx * lobe.my * (1.0 - min(wo.z * wo.z, 1.0))), 0.01);
+    let ends = clamp(wo.z + vec2f(-reach, reach), vec2f(0.0), vec2f(1.0));
+    let low = lambent_tint(ends.x, lobe);
+    let rise = (lambent_tint(ends.y, lobe) - low) / (ends.y - ends.x);
+    return Tints(low + (wo.z - ends.x) * rise, rise);
+}
+
+// `gain` of a fixed sample.
+fn sample_gain(along: Tints, lobe: LambentLobe, at: Sample, wo: vec3f) -> vec3f {
+    if !LAMBENT_CURVES { return gain(lobe, at.wi, wo, at.h); }
+    let tint = max(along.middle + (at.cos_d - wo.z) * along.rise, vec3f(0.0));
+    return tint * (at.wi.z / (lambent_cosine_power(at.wi, wo, lobe) * at.h.z));
+}
+
 // Diffuse light towards cos_o from the irradiance on this side and on the other (4.1). A kd that depends on both
 // directions is kd t(cos_o) times a mean over the light, which is 1 under uniform light, and is assumed 1 for all light.
 fn diffuse_light(cos_o: f32, e_here: vec3f, e_beyond: vec3f, painted: Painted) -> vec3f {

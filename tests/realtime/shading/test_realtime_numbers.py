@@ -135,8 +135,9 @@ def test_widths_of_a_lobe_about_its_mirror_direction() -> None:
     ):
         declared = f"""fn widths(wo: vec3f) -> vec2f {{
     var lobe: LambentLobe;
-    lobe.mx = {mx};
-    lobe.my = {my};
+    lobe.mx = {2 * mx};
+    lobe.my = {2 * my};
+    lobe.spread = 0.5; // a curve as wide as a Beckmann lobe of half the slopes
     return lobe_half_widths(lobe, wo);
 }}"""
         found = run_wgsl(source, "widths(wo)", {"wo": wo}, components=2, declarations=declared)

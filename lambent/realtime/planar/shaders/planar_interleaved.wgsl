@@ -15,6 +15,7 @@ const SHARE_STEPS = 15.0; // of how far a sample lies outside the buffer: 4 bits
 fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place) -> vec3f {
     let first_jitter = fract(0.754878 * f32(s.pixel.x & 3u) + 0.569840 * f32(s.pixel.y & 3u));
     let here = lobe_here(index, s);
+    let tint = tints(here.lobe, wo);
     var sum = vec3f(0.0);
     var shares = array<u32, 8>();
     var beyond = 0u;
@@ -22,7 +23,7 @@ fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place
         let q = samples[first + k];
         let at = sample_about(wo, lambent_from_slopes(q.xy * here.growth));
         if (!at.seen) { continue; }
-        let g = q.w * gain(here.lobe, at.wi, wo, at.h);
+        let g = q.w * sample_gain(tint, here.lobe, at, wo);
         let w = to_world(s, at.wi);
         let hit = march(place, w, fract(first_jitter + 0.618034 * f32(k)));
         let outside = u32(round(SHARE_STEPS * (1.0 - hit.inside)));
@@ -38,7 +39,7 @@ fn planar_quadrature(index: u32, first: u32, wo: vec3f, s: Surface, place: Place
         let q = samples[first + k];
         let at = sample_about(wo, lambent_from_slopes(q.xy * here.growth));
         let share = f32((shares[k >> 3u] >> ((k & 7u) << 2u)) & 15u) / SHARE_STEPS;
-        let g = share * q.w * gain(here.lobe, at.wi, wo, at.h);
+        let g = share * q.w * sample_gain(tint, here.lobe, at, wo);
         let light = incident(s, at.wi, half_log2_omega(q, at, here));
         others += select(vec3f(0.0), g * light, share > 0.0);
     }
