@@ -128,7 +128,7 @@ class Input:
     def _scale(self, factor: float | None) -> None:
         now = self.screen.remembered.now.scale
         wanted = 1.0 if factor is None else round(min(max(now * factor, LEAST_SCALE), MOST_SCALE), 2)
-        self.screen.remember(scale=wanted)
+        self.screen.remembered.set(scale=wanted)
 
     # Further events that a mode may handle.
 

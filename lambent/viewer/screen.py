@@ -87,12 +87,14 @@ class Screen:
     enter: Callable[[Any], Any] | None = None  # returns the mode to exchange the present one for, see `exchange`
     exchanging: bool = False  # whether the present mode is being closed for another one
     histories: dict[Path, Any] = field(default_factory=dict)  # of edits, by store, for the mode that comes back
-    remembered: Remembered = field(default_factory=Remembered)
     card_shown: bool = False  # whether the card of the first start is shown
     by_keys: bool = False  # whether keys go to the controls instead of the picture
     list_open: bool = False  # whether a list or a question lay over the last frame
     images: dict[str, Any] = field(default_factory=dict)  # pictures of panels (H, W, 4), by name
     textures: Mapping[str, Any] = field(default_factory=dict)  # of the layout and of `images`, once on the GPU
+
+    def __post_init__(self) -> None:
+        self.remembered = Remembered(self.say)
 
     @property
     def size(self) -> Size:
@@ -101,22 +103,11 @@ class Screen:
 
     @size.setter
     def size(self, size: Size) -> None:
-        self.remember(size=size)
+        self.remembered.set(size=size)
 
     def next_size(self, step: int = 1) -> None:
         """Go to the next size of the window, or `step` further."""
         self.size = SIZES[(SIZES.index(self.size) + step) % len(SIZES)]
-
-    def remember(self, **changes: object) -> None:
-        """Change settings of the window, and keep them for the next one."""
-        self.remembered.set(**changes)
-        self.say_fault()
-
-    def say_fault(self) -> None:
-        """Say once why settings are not kept."""
-        if self.remembered.fault:
-            self.say(self.remembered.fault)
-            self.remembered.fault = ""
 
     def say(self, text: str) -> None:
         """Show a message for `MESSAGE_S` seconds."""

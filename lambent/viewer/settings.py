@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal, get_args
@@ -56,11 +57,11 @@ def read_settings(file: Path) -> Settings:
 
 @dataclass
 class Remembered:
-    """The settings, and the `file` that keeps them, None for this window alone. `fault` says why they are not kept."""
+    """The settings, and the `file` that keeps them, None for this window alone; `say` tells why they are not kept."""
 
+    say: Callable[[str], None]
     file: Path | None = None
     now: Settings = field(default_factory=Settings)
-    fault: str = ""
 
     def open(self, file: Path | None) -> None:
         """Take the settings of a file; where it cannot be read, those of the first start."""
@@ -68,7 +69,7 @@ class Remembered:
         try:
             self.now = Settings() if file is None else read_settings(file)
         except (UserError, OSError) as error:
-            self.fault = f"the window starts as the first time: {error}"
+            self.say(f"the window starts as the first time: {error}")
 
     def set(self, **changes: object) -> None:
         """Change settings and keep them; an out-of-range value is a `ValidationError`."""
@@ -81,4 +82,4 @@ class Remembered:
                 self.file.parent.mkdir(parents=True, exist_ok=True)
                 write_text(self.file, now.model_dump_json(indent=1) + "\n")
         except (UserError, OSError) as error:
-            self.fault = f"not remembered: {error}"
+            self.say(f"not remembered: {error}")

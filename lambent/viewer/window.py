@@ -71,7 +71,6 @@ class Window:
         self._woken = False  # by background work, since the last frame
         self.screen.wake = self._wake
         self.screen.remembered.open(settings_file())
-        self.screen.say_fault()
         glfw.set_drop_callback(self.canvas._window, self._dropped)  # type: ignore[arg-type]
         self._take_the_close_button()
         self._pad = PadWatch(GlfwPads(glfw), loop.call_later, self._wake)

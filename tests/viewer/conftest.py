@@ -46,7 +46,7 @@ class Clock:
 def screen(tmp_path):
     """In the size that shows every number."""
     shown = Screen(tmp_path, Clock(), Rect(0, 0, 400, 300))
-    shown.remember(size="measure", card_seen=True)
+    shown.remembered.set(size="measure", card_seen=True)
     return shown
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.viewer.screen import Screen
-from lambent.viewer.settings import MOST_BYTES, Remembered, Settings, read_settings, settings_file
+from lambent.viewer.settings import MOST_BYTES, Settings, read_settings, settings_file
 
 
 def test_the_file_lies_in_the_users_configuration(monkeypatch, tmp_path):
@@ -28,8 +28,8 @@ def test_a_change_is_there_for_the_next_window(tmp_path):
     screen.remembered.open(file)
     assert screen.size == "design"
     screen.next_size()
-    screen.remember(scale=1.5)
-    later = Remembered()
+    screen.remembered.set(scale=1.5)
+    later = Screen().remembered
     later.open(file)
     assert (later.now.size, later.now.scale) == ("measure", 1.5) and not screen.messages
 
@@ -37,7 +37,7 @@ def test_a_change_is_there_for_the_next_window(tmp_path):
 def test_keys_of_a_later_version_stay(tmp_path):
     file = tmp_path / "window.json"
     file.write_text(json.dumps({"size": "show", "halo": [1, 2]}))
-    remembered = Remembered()
+    remembered = Screen().remembered
     remembered.open(file)
     remembered.set(card_seen=True)
     assert json.loads(file.read_text()) == {"size": "show", "scale": 1.0, "card_seen": True, "halo": [1, 2]}
@@ -53,9 +53,8 @@ def test_a_damaged_file_is_said_and_the_window_opens(tmp_path, text):
         read_settings(file)
     screen = Screen()
     screen.remembered.open(file)
-    screen.say_fault()
     assert screen.remembered.now == Settings() and "as the first time" in screen.messages[0].text
-    screen.remember(size="show")
+    screen.remembered.set(size="show")
     assert read_settings(file).size == "show" and len(screen.messages) == 1
 
 
@@ -64,7 +63,6 @@ def test_settings_that_cannot_be_kept_are_said_once_and_count(tmp_path):
     (tmp_path / "file").write_text("in the way of a folder")
     screen = Screen()
     screen.remembered.open(tmp_path / "file" / "window.json")
-    screen.remember(size="show")
-    screen.say_fault()
+    screen.remembered.set(size="show")
     (message,) = screen.messages
     assert screen.size == "show" and "not remembered" in message.text

@@ -19,7 +19,7 @@ def draw(screen: Screen, lines: Sequence[str]) -> None:
     """Draw the card while it is shown; the first time, remember that it was."""
     if not screen.remembered.now.card_seen:
         screen.card_shown = True
-        screen.remember(card_seen=True)
+        screen.remembered.set(card_seen=True)
     if not screen.card_shown:
         return
     imgui.set_next_window_pos(screen.picture.point(0.5, 0.4), imgui.Cond_.always, (0.5, 0.5))

@@ -182,7 +182,7 @@ def test_every_control_takes_the_keys(window, state, size):
 
 def test_the_card_is_shown_once(window, state):
     assert not state.screen.card_shown
-    state.screen.remember(card_seen=False)
+    state.screen.remembered.set(card_seen=False)
     window.frame(2)
     assert state.screen.card_shown and len(CARD) == 4
     window.click("begin")
