@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 
 from lambent.core.errors import UserError
@@ -54,13 +55,14 @@ class InPlace(SessionFile):
         UserError
             If the edits cannot be used.
         """
-        said, file = self.opened.edited.get(camera.name), self.store / FILE
-        if said is None:
+        edited, file = self.opened.edited, self.store / FILE
+        there = (one for one in edited.values() if _place(one.document.get("camera")) == _place(asdict(camera)))
+        if (said := edited.get(camera.name) or next(there, None)) is None:  # a saved view may have been renamed
             return self._former(camera, former)
         document = document_from(said.document, file)
         self._foreign = {name: one for name, one in document.materials.items() if name not in materials}
         known = {name: one for name, one in document.materials.items() if name in materials}
-        place = {"scene": str(self.store.resolve()), "materials": known}
+        place = {"scene": str(self.store.resolve()), "camera": camera, "materials": known}
         session = Session.of(document.model_copy(update=place), file)
         for name in known:
             before, now = said.room.get(name, materials[name]), self.material(name, materials[name])
@@ -143,3 +145,11 @@ class InPlace(SessionFile):
             shown = tuple(name for name in document.materials if name not in self.unshown)
             self._of, self._section = of, EditedView(document=whole.model_dump(mode="json"), room=room, shown=shown)
         return self._section
+
+
+def _place(camera: object) -> object:
+    """A camera of a document without its name."""
+    numbers = (
+        ((k, tuple(v) if isinstance(v, list) else v) for k, v in camera.items()) if isinstance(camera, dict) else ()
+    )
+    return {name: value for name, value in numbers if name != "name"}

@@ -103,6 +103,19 @@ def test_views_have_edits_of_their_own(edited, store):
     assert curves(Window(store).close()) != curves(Window(store, camera="side").close())
 
 
+def test_a_view_that_was_renamed_keeps_its_edits(edited, store):
+    edited.close()
+    said = json.loads((store / FILE).read_text())
+    said["edited"] = {"before": said["edited"]["front"]}
+    said["edited"]["before"]["document"]["camera"]["name"] = "before"
+    (store / FILE).write_text(json.dumps(said))
+    again = Window(store)
+    assert curves(again) == curves(edited)
+    again.pull(1.0)
+    again.close()
+    assert set(read_session(store / FILE).edited) >= {"front"}
+
+
 PLACE = {"position": [1.0, 1.0, 1.0], "target": [0.0, 0.0, 0.0]}
 
 

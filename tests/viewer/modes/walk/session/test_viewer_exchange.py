@@ -9,9 +9,11 @@ from lambent.editing.curves.operators import Region
 from lambent.editing.session.document import OfDocument
 from lambent.store.kept.session import FILE, read_session
 from lambent.store.kept.views import read_views
+from lambent.viewer.modes.edit import start
 from lambent.viewer.modes.edit.mode import EditMode
 from lambent.viewer.modes.walk.mode import WalkMode, open_store
 from lambent.viewer.modes.walk.session.leaving import edit_view
+from tests.viewer.drawn_frames import drawn
 
 LOW = Region(a=-0.2, b=0.0, c=0.3, d=0.9)
 BLUE = (0.1, 0.1, 0.6)
@@ -60,6 +62,8 @@ def test_there_and_back(mode, baked_box):
     back = enter(mode)
     assert isinstance(back, WalkMode) and back.state.navigation.camera == document.camera
     assert back.state.selection.name == "left" and back.state.look.exposure_ev == -1.0
+    drawn(back.drawing, back.state, (32, 24))
+    assert back.drawing._a.read().mean() > 0
     edits = back.state.materials.edits
     assert edits.current("red").kd == BLUE and edits.can_undo
     edits.undo()
@@ -89,6 +93,16 @@ def test_what_the_room_shows_of_the_edits_is_a_step_that_can_be_undone(mode, bak
     edit_view(back.state)
     again = enter(mode)
     assert again.state.session.document.materials["red"].curves and again.state.files.keeper.unshown == []
+
+
+def test_a_window_that_began_with_a_view_enters_the_room(adapter, mode, baked_box, screen):
+    mode[0].close()
+    mode.append(start(baked_box, "edit", screen, camera="front"))
+    mode[-1].state.enter_room()
+    back = enter(mode)
+    drawn(back.drawing, back.state, (32, 24))
+    assert isinstance(back, WalkMode) and back.drawing._a.read().mean() > 0
+    assert back.state.navigation.camera.name == "front"
 
 
 def test_a_view_that_cannot_be_edited_leaves_the_window_in_the_room(mode, monkeypatch):
