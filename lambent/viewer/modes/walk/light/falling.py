@@ -19,11 +19,12 @@ from lambent.core.light.photometry import ILLUMINANCE, photometric
 from lambent.realtime.light.baked import BakedScene
 from lambent.realtime.light.group_arrays import GroupArrays
 from lambent.scenes.light_groups import SUN
+from lambent.store.contract import sun_left_out
 from lambent.store.store import Store
 from lambent.viewer.background.work import Work, pending
 
 ALL = "all light"
-WITHOUT_SUN = "without the direct sun, which `lambent bake --only answer` adds"
+WITHOUT_SUN = "without the direct sun: the sky is turned, or the store lacks `lambent bake --only answer`"
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,9 @@ class FallingLight:
     @cached_property
     def _sun(self) -> Floats | None:
         """(2 H W, 3) direct irradiance of the sun, W/m^2, on both sides of the texels; None where it is not known."""
-        if not has_answer(self.store) or self.scene.replaced or self.scene.irradiance is None:
+        baked, sun = sun_left_out(self.store), self.scene.sun
+        as_baked = baked is not None and sun is not None and baked.direction == sun.direction
+        if not as_baked or not has_answer(self.store) or self.scene.replaced or self.scene.irradiance is None:
             return None
         read = [self.store.read(answer_name(part)) for part in ("point_sun", "texels", "near", "shares")]
         texels, near = map(from_delta_bytes, read[1:3])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from lambent.baked.answering.delta_bytes import delta_bytes
 from lambent.core.light.light_mix import GroupMix, LightMix
 from lambent.core.light.photometry import LM_PER_W
 from lambent.materials.document import Material
@@ -12,6 +13,7 @@ from lambent.scenes.geometry import merge, patch
 from lambent.store.contract import ObjectRecord, SceneRecord, SunRecord
 from lambent.store.light_groups import LightGroupRecord
 from lambent.store.store import Store
+from lambent.viewer.modes.walk.light import falling as falling_module
 from lambent.viewer.modes.walk.light.falling import WITHOUT_SUN, FallingLight
 from lambent.viewer.modes.walk.panels import metering
 
@@ -102,6 +104,27 @@ def test_the_direct_sun_is_added_to_its_group_or_said_to_be_missing(room):
     falling.__dict__["_sun"] = np.repeat([[5.0], [0.0]], SIDE * SIDE, axis=1).T.reshape(-1, 1) * np.ones(3)
     found = falling._light_on(frozenset(["floor"]), by_group)
     assert found.illuminance_lx(LightMix())["sun"] == pytest.approx(5 * LM_PER_W) and found.note == ""
+
+
+def test_the_direct_sun_is_that_of_the_answer_of_the_same_sky(room, monkeypatch):
+    scene, store = room
+    sun = SunRecord(direction=(0, 1, 0), irradiance=(1, 1, 1), radius_rad=0.01)
+    store.put("light_map/irradiance", "light_map", scene.irradiance, key="k", meta={"sun": sun.model_dump(mode="json")})
+    texels, shares = np.arange(0, 2 * SIDE * SIDE, 2), np.tile(np.uint8([3, 1, 0, 0, 0, 0, 0, 0]), (SIDE * SIDE, 1))
+    arrays = {
+        "point_sun": np.float32([[4, 4, 4], [8, 8, 8]]), "texels": delta_bytes(texels), "shares": shares,
+        "near": delta_bytes(np.tile([0, 1, 0, 0, 0, 0, 0, 0], (SIDE * SIDE, 1))),
+    }  # fmt: skip
+    for name, array in arrays.items():
+        store.put(f"answer/{name}", "answer", array, key="k")
+    monkeypatch.setattr(falling_module, "has_answer", lambda store: True)
+    object.__setattr__(scene, "sun", sun)
+    by_group = groups_of(np.stack([scene.irradiance, 0 * scene.irradiance]))
+    found = found_on(scene, store, "floor", by_group)
+    assert found.illuminance_lx(LightMix())["sun"] == pytest.approx(5 * LM_PER_W), "the weighted mean of two points"
+    object.__setattr__(scene, "sun", sun.model_copy(update={"direction": (0, 0.6, 0.8)}))
+    turned = found_on(scene, store, "floor", by_group)
+    assert turned.note == WITHOUT_SUN and turned.illuminance_lx(LightMix())["sun"] == 0
 
 
 def test_it_is_looked_up_again_for_other_light_and_not_during_a_drag(room):
