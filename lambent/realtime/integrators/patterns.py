@@ -39,8 +39,10 @@ BORDER_MASS = 0.01  # share of the lobe outside its border (4.10)
 RING_XI1 = 0.6  # the thesis's ring, 40 % of the way to the border
 
 
-def ring_counts(n: int) -> tuple[int, ...]:
+def ring_counts(n: int, has_curve: bool = False) -> tuple[int, ...]:
     """Samples per ring, from the centre outwards: tested splits; for other n, a centre and rings of about seven."""
+    if has_curve and n in LONG_TAILED:
+        return LONG_TAILED[n]
     if n in RINGS:
         return RINGS[n]
     rings = max(1, round((n - 1) / 7))
@@ -64,7 +66,7 @@ def ring_pattern(n: int, lobe: Lobe) -> Pattern:
     are the sharpest, but break the highlight of a small lamp into one piece per sample. Filters of `ring_bias` keep it
     nearly whole, and `ring_stretch` shrinks the rings to preserve the lobe's width.
     """
-    counts = LONG_TAILED.get(n, ring_counts(n)) if lobe.shape is not None else ring_counts(n)
+    counts = ring_counts(n, lobe.shape is not None)
     centred = counts[0] == 1 and n > 1
     centre = 0.0 if not centred else CENTRE_WEIGHT_FEW if n < 7 else CENTRE_WEIGHT
     weight = np.full(n, (n - centre) / (n - centred))

@@ -36,7 +36,7 @@ def test_half_of_each_rings_mass_lies_inside_its_radius(n: int, lobe: Lobe) -> N
     r = np.linalg.norm(pattern.slopes, axis=-1) / patterns.ring_stretch(n)
     inside = r**2 / (1 + r**2) if lobe is not BECKMANN else 1 - np.exp(-(r**2))
     before, first = 0.0, 0
-    for count in patterns.ring_counts(n):
+    for count in patterns.ring_counts(n, lobe is GGX_CURVE):
         mass = pattern.weight[first : first + count].sum() / n
         expected = 0.0 if count == 1 and before == 0 else before + mass / 2
         np.testing.assert_allclose(inside[first : first + count], expected, atol=1e-12)
@@ -74,7 +74,7 @@ def test_a_ggx_line_is_the_quantile_of_the_marginal(lobe: Lobe) -> None:
 
 
 def test_a_curve_of_ggx_has_its_samples() -> None:
-    for n in NS:
+    for n in {*NS} - {*patterns.LONG_TAILED}:
         np.testing.assert_allclose(patterns.rings_table(GGX_CURVE, n), patterns.rings_table(GGX, n), atol=2e-6)
 
 
