@@ -25,6 +25,7 @@ from lambent.scenes.lamp_edits import LampEdit
 from lambent.scenes.scene import ImageTexture
 from lambent.store.kept.images import kept_image
 from lambent.store.kept.session import FILE, KeptLook, KeptView, RoomState, WalkSession, read_session, write_session
+from lambent.store.kept.states import variants_of
 from lambent.store.store import Store
 from lambent.traced.picture import TracedPicture
 from lambent.viewer.modes.walk.at_rest.traced import _wish_of
@@ -157,6 +158,20 @@ def session_of(store: Path, **changes: Any) -> None:
     look = KeptLook(exposure_ev=1.0, integrator="rings")
     view = KeptView(camera=THERE, size=(24, 16), traces=False, look=look)
     write_session(store / FILE, WalkSession(view=view).model_copy(update=changes))
+
+
+@pytest.mark.parametrize("integrator", ["rings", "traced"])
+def test_states_show_their_lamps_also_one_after_the_other(adapter: None, store: Path, integrator: str) -> None:
+    moved = RoomState(lamps={0: LampEdit((0.3, 0.8, 0.3))})
+    session_of(store, states={"moved": moved, "plain": RoomState()})
+    how: dict[str, Any] = {"samples": 2, "denoise": False} if integrator == "traced" else {}
+    settings, opened = Settings(*SIZE, integrator=integrator, exposure_ev=0.0, **how), Store.open(store)
+    alone = [images(opened, replace(settings, variant=name)).radiance(THERE) for name in ("moved", "plain")]
+    drawn_in_turn, named = images(opened, settings), {one.name: one for one in variants_of(opened)}
+    for name, expected in zip(("moved", "plain"), alone, strict=True):
+        drawn_in_turn.apply_variant(named[name])
+        assert np.array_equal(drawn_in_turn.radiance(THERE), expected)
+    assert np.abs(alone[0] - alone[1]).max() > 0.01 * alone[1].max()
 
 
 def test_options_that_are_given_apply(

@@ -5,7 +5,11 @@ from dataclasses import replace
 import pytest
 
 from lambent.materials.document import load_material
+from lambent.store.kept.session import FILE, read_session
 from lambent.store.kept.views import read_views
+from lambent.viewer.edits.session_file import READ_ONLY
+from lambent.viewer.modes.walk.panels import room
+from lambent.viewer.panels import overlay
 from tests.viewer.panel_driver import PanelDriver, walk_mode
 
 
@@ -134,3 +138,23 @@ def test_it_fits_a_small_window(monkeypatch, state, geometry):
     assert all(0 <= driver.rects[f"{a}##closing"][0] < driver.rects[f"{a}##closing"][2] <= 320
                for a in ("save", "discard", "stay"))  # fmt: skip
     driver.close()
+
+
+def test_a_read_only_window_says_so_over_the_picture_and_above_the_panels(monkeypatch, panels, state):
+    above, over = [], []
+    monkeypatch.setattr(room, "wrapped", lambda lines: above.extend(lines))
+    monkeypatch.setattr(overlay, "draw", lambda screen, lines, *_: over.extend(lines))
+    state.session.fault = ""
+    panels.frame()
+    assert READ_ONLY not in (*above, *over)
+    state.session.fault = READ_ONLY
+    panels.frame()
+    assert above == [READ_ONLY] and READ_ONLY in over
+
+
+def test_a_session_that_is_kept_is_not_asked_about(panels, state):
+    state.session.open()
+    change(state)
+    assert panels.mode.unsaved == ()
+    panels.mode.close()
+    assert read_session(state.store / FILE).now.materials["brass"].kd == (0.3, 0.3, 0.3)
