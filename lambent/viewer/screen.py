@@ -86,7 +86,7 @@ class Screen:
     wake: Callable[[], None] = lambda: None  # draws a frame soon; any thread may call it
     enter: Callable[[Any], Any] | None = None  # returns the mode to exchange the present one for, see `exchange`
     exchanging: bool = False  # whether the present mode is being closed for another one
-    histories: dict[Path, Any] = field(default_factory=dict)  # of edits, by store, for the mode that comes back
+    histories: dict[object, Any] = field(default_factory=dict)  # of edits, for the mode that comes back
     card_shown: bool = False  # whether the card of the first start is shown
     by_keys: bool = False  # whether keys go to the controls instead of the picture
     list_open: bool = False  # whether a list or a question lay over the last frame

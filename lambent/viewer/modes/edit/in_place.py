@@ -31,7 +31,10 @@ class InPlace(SessionFile):
     def __init__(self, store: Path, screen: Screen, soon_s: float = SOON_S) -> None:
         super().__init__(store, screen, soon_s)
         self.store, self.lines = store, [line for line in self.read(store) if line != self.fault]
-        self._now = self.opened.now
+        self._now = now = self.opened.now
+        parts = {"light mix": now.light.groups, "lamps": now.lamps, "textures": now.textures}
+        if other := [what for what, changed in parts.items() if changed]:
+            self.lines.append(f"shown as baked here: the room's {', '.join(other)}")
         self._foreign: dict[str, EditedMaterial] = {}  # materials of the view that the scene lacks
         self._edited: Session | None = None
         self._look = Look()
@@ -87,6 +90,10 @@ class InPlace(SessionFile):
 
     def begin(self, session: Session, look: Look) -> None:
         """Keep these edits, and the exposure and view transform of the `look`, which are the session's first."""
+        history, now = self._screen.histories.pop((self.store, session.document.camera), None), session.document
+        if history is not None and history.now.size == now.size:
+            history.change(now)
+            session.history = history
         self._edited, self._look, view = session, look, self.opened.view
         said, materials = self.opened.edited.get(session.document.camera.name), session.document.materials
         plain = {name for name, one in materials.items() if one == EditedMaterial(source=one.source)}
@@ -112,6 +119,12 @@ class InPlace(SessionFile):
     def has_exposure(self) -> bool:
         """Whether the session has an exposure."""
         return self.opened.view is not None and self.opened.view.look.exposure_ev is not None
+
+    def close(self) -> None:
+        if self._screen.exchanging and self._edited is not None:
+            self._edited.history.end_stroke()
+            self._screen.histories[self.store, self._edited.document.camera] = self._edited.history
+        super().close()
 
     def show_in_room(self, name: str, material: Material) -> None:
         """Let the room have a material as it is edited here."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from lambent.core.errors import UserError
+from lambent.core.light.light_mix import GroupMix, LightMix
 from lambent.editing.curves.operators import Region
 from lambent.editing.session.document import OfDocument
 from lambent.store.kept.session import FILE, read_session
@@ -72,7 +73,10 @@ def test_there_and_back(mode, baked_box):
     edit_view(back.state)
     again = enter(mode)
     assert len(read_views(baked_box).cameras) == 1, "the view is a camera already"
-    assert again.state.session.document.materials["red"].curves and again.state.session.document.size == (width, height)
+    session = again.state.session
+    assert session.document.materials["red"].curves and session.document.size == (width, height)
+    session.undo()
+    assert not session.document.materials["red"].curves, "the view's history too"
 
 
 def test_what_the_room_shows_of_the_edits_is_a_step_that_can_be_undone(mode, baked_box):
@@ -125,6 +129,13 @@ def test_what_would_be_lost_keeps_the_window_in_the_room(mode):
     edit_view(state)
     assert state.screen.enter is None and "the recorded walk" in state.screen.messages[-1].text
     state.recordings.drop()
+
+
+def test_a_view_says_what_of_the_room_it_does_not_show(mode):
+    state = mode[0].state
+    state.materials.edits.mix(LightMix({"lamp": GroupMix(intensity=0.5)}))
+    edit_view(state)
+    assert enter(mode).state.files.keeper.lines == ["shown as baked here: the room's light mix"]
 
 
 def test_a_view_starts_from_the_scene_where_the_room_is_as_baked(mode):
