@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from lambent.core.progress import Cancelled, Progress, silent
 from lambent.materials.document import Distribution, Kind, Lobe, Material, Provenance, Side
 from lambent.materials.fitting import account, gradient, parameters
 from lambent.materials.fitting.account import Curve
-from lambent.materials.fitting.choices import DISTRIBUTION, DistributionChoice
+from lambent.materials.fitting.choices import DISTRIBUTION, MAX_LOBES, DistributionChoice, Lobes
 from lambent.materials.fitting.curves import DARK, CurveFit, fit_curve
 from lambent.materials.fitting.gradient import Bounds
 from lambent.materials.fitting.parameters import BOUNDS, RETRO_BOUNDS, SHAPE, Box, Fixed, Ranges, parameter
@@ -37,8 +36,6 @@ DISTRIBUTIONS: dict[str, tuple[Distribution, ...]] = {
     "ggx": ("ggx",),
     "best": ("beckmann", "ggx"),
 }
-Lobes = int | Literal["auto", "curve"]
-MAX_LOBES = 4
 CURVED = ("kd", "kt_d", "alpha", "t_alpha", "kr", "r_mx", "r_my", "r_r0", "r_alpha")  # names with a curve lobe
 GAIN = 0.05  # share of E that another lobe must remove if the number of lobes is "auto"
 RETRO_RATIO = 2.0  # median of f near the light over that beside it, above which a retro lobe is tried

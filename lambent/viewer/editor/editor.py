@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 from lambent.core.progress import Progress
-from lambent.materials.fitting.choices import DISTRIBUTION, DistributionChoice
+from lambent.materials.fitting.choices import DISTRIBUTION, MAX_LOBES, DistributionChoice, Lobes
 from lambent.viewer.background.work import Work, pending
 from lambent.viewer.editor.files import Files
 from lambent.viewer.editor.measurement import Measurement
@@ -20,7 +20,7 @@ from lambent.viewer.editor.subject import Subject
 from lambent.viewer.edits.edits import MaterialEdits
 from lambent.viewer.screen import Screen
 
-LOBES = ("auto", "1", "2", "3", "4")
+LOBES = ("auto", "1", "2", "3", "4", "curve")
 
 
 class Fit:
@@ -36,10 +36,11 @@ class Fit:
 
     def start(self, measurement: Measurement | None, metric: str) -> None:
         """Fit under the restrictions; the result comes as one step of undo."""
-        material, say, automatic = self._subject.material, self._screen.say, self.lobes == "auto"
+        material, say = self._subject.material, self._screen.say
+        lobes = cast(Lobes, int(self.lobes) if self.lobes.isdecimal() else self.lobes)
         if measurement is None or self.work is not None:
             return
-        most = 4 if automatic else int(self.lobes)
+        most = lobes if isinstance(lobes, int) else MAX_LOBES if lobes == "auto" else 1
         fix, ranges, unknown = self._subject.restrictions.for_fit(material, most)
         if unknown:
             say(f"left out of the fit: {', '.join(unknown)}")
@@ -49,7 +50,7 @@ class Fit:
             from lambent.materials.fitting.fit import fit  # loads SciPy
 
             return fit(
-                measurement.samples, lobes="auto" if automatic else most, metric=metric, distribution=distribution,
+                measurement.samples, lobes=lobes, metric=metric, distribution=distribution,
                 coupled=material.kd_coupled, fix=fix, ranges=ranges, source=measurement.path, progress=progress,
             )  # fmt: skip
 

@@ -9,8 +9,9 @@ from typing import get_args
 
 from imgui_bundle import imgui
 
-from lambent.materials.document import KINDS, Lobe, Material
+from lambent.materials.document import KINDS, Distribution, Lobe, Material
 from lambent.materials.fitting.choices import DISTRIBUTION_CHOICES
+from lambent.materials.lobes import with_distribution
 from lambent.materials.measured.inspecting.metrics import METRICS
 from lambent.materials.models.model import Parameter
 from lambent.viewer.editor.editor import LOBES, Editor
@@ -30,7 +31,7 @@ from lambent.viewer.panels.widgets import (
     wrapped,
 )
 
-OF_LOBES: tuple[str, ...] = get_args(Lobe.model_fields["distribution"].annotation)
+OF_LOBES: tuple[Distribution, ...] = get_args(Lobe.model_fields["distribution"].annotation)
 LABEL_PX = 52
 RANGE_PX = 26
 
@@ -188,12 +189,12 @@ def _heading(editor: Editor, index: int, lobe: Lobe) -> Lobe:
     if turned != lobe.kind:
         editor.queue(lambda: subject.turn_lobe(index, turned))
     imgui.same_line()
-    meaning = "microfacet distribution: beckmann is bell-shaped, ggx has long tails"
+    meaning = "microfacet distribution: beckmann is bell-shaped, ggx has long tails, a curve has any shape"
     kind = choice("##distribution", lobe.distribution, OF_LOBES, meaning, min(px(96), 0.3 * room))
     imgui.same_line()
     if press("remove", "removes the lobe; can be undone", -1):
         editor.queue(lambda: subject.remove_lobe(index))
-    return lobe if kind == lobe.distribution else lobe.model_copy(update={"distribution": kind})
+    return lobe if kind == lobe.distribution else with_distribution(lobe, kind)
 
 
 def _new_lobes(editor: Editor) -> None:

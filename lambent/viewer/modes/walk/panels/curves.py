@@ -21,6 +21,7 @@ from lambent.editing.curves.nodes import (
     with_values,
 )
 from lambent.materials.document import Material
+from lambent.viewer.modes.walk.session.leaving import edit_view
 from lambent.viewer.modes.walk.state import Materials, WalkState
 from lambent.viewer.panels.plots import BLUE, GREEN, MEASURED, MODEL, RED
 from lambent.viewer.panels.widgets import buttons, choice, explain, px
@@ -75,8 +76,24 @@ class CurvesPanel:
         values, scene = values_of(material, which), materials.edits.scene[name]
         buttons(
             [
-                ("smooth", True, lambda: asked.append(with_values(material, which, smoothed(values))), "calms kinks"),
-                ("reset", material != scene, lambda: asked.append(_reset(material, scene, which)), "as baked"),
+                (
+                    "smooth",
+                    True,
+                    lambda: asked.append(with_values(material, which, smoothed(values))),
+                    "averages each node with its neighbours",
+                ),
+                (
+                    "reset",
+                    material != scene,
+                    lambda: asked.append(_reset(material, scene, which)),
+                    "restores the curve as baked",
+                ),
+                (
+                    "exact here",
+                    self._can_edit,
+                    self._edit,
+                    "opens this view under exact direct light",
+                ),
             ]
         )
         others = [other for other in materials.edits.scene if other != name]
@@ -86,6 +103,13 @@ class CurvesPanel:
         elif chosen:
             self.state.screen.say(f"{chosen} has no {TITLES[which.kind]} of this kind")
         return asked[-1] if asked else material
+
+    @property
+    def _can_edit(self) -> bool:
+        return self.state.session.keeps and self.state.rebaking.possible
+
+    def _edit(self) -> None:
+        edit_view(self.state)
 
     def _plot(self, material: Material, scene: Material, which: Which) -> Material:
         """Draw the curve; return the material after a pull."""
