@@ -28,6 +28,7 @@ from lambent.core.pictures import metrics
 from lambent.core.plain import Triple
 from lambent.core.progress import Progress, silent
 from lambent.core.views.camera import Camera, pixel_rays
+from lambent.editing.curves.nodes import curves_of, pulled, values_of, with_values
 from lambent.render.edits import edits_of
 from lambent.scenes.looks.retexturing import diffuse_textures, materials_without_uv
 from lambent.scenes.scene import Look, Scene
@@ -47,6 +48,7 @@ NAME = "edits"
 T = TypeVar("T")
 COLOURS: dict[str, Triple] = {"blue": (0.03, 0.06, 0.2), "light": (0.8, 0.8, 0.8)}
 WARM: Triple = (1.0, 0.5, 0.15)  # factors of a coloured lamp
+PULL = 3.0  # factor on the middle node of a curve
 TURNS_DEG = 90.0, 180.0
 SEEN_FROM = 24, 14  # rays that find what the camera sees most of
 VISIBLE = 0.1  # mean FLIP of a tile, above that of the truth's noise
@@ -146,6 +148,7 @@ def edits_for(store: Store, scene: Scene, camera: Camera, most: int) -> dict[str
     placed = [(name, of) for name in seen if name not in bare for of in images if of != name]
     kinds = (
         {f"{name} {word}": Edit(colours={name: to}) for name in seen[:4] for word, to in COLOURS.items()},
+        {f"{name}, {what}": Edit({name: look}) for name in seen[:3] for what, look in _curved(scene, name).items()},
         {f"{name} as {of}": Edit({name: _look(scene, name, of)}) for name, of in pairwise(seen[:5])},
         {f"texture of {of} on {name}": Edit(textures={name: of}) for name, of in placed[:2]},
         {f"{lamp} off": Edit(light={lamp: (0.0, 0.0, 0.0)}) for lamp in lamps[:2] if len(lamps) > 1},
@@ -159,6 +162,18 @@ def edits_for(store: Store, scene: Scene, camera: Camera, most: int) -> dict[str
 def _look(scene: Scene, name: str, of: str) -> Look:
     document = scene.materials[of].model_copy(update={"name": scene.materials[name].name})
     return Look(document, of if of in scene.textures else "")
+
+
+def _curved(scene: Scene, name: str) -> dict[str, Look]:
+    """Pulled curves of a material, as far as it has them."""
+    material, found = scene.materials[name], dict[str, Look]()
+    for which in curves_of(material):
+        values = values_of(material, which)
+        node = len(values) // 2
+        pulled_to = pulled(values, node, PULL * float(values[node].max()), (0, 1, 2)[: values.shape[1]], soft=True)
+        edited = with_values(material, which, pulled_to)
+        found.setdefault(f"{which.kind} pulled", Look(edited, name if name in scene.textures else ""))
+    return found
 
 
 def _seen(store: Store, scene: Scene, camera: Camera) -> list[str]:
