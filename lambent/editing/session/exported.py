@@ -90,7 +90,10 @@ def export(
         table = EditedTable(part_of(edited, rest), name)
         samples = table.samples()
         if samples.f.any():
-            found = fit(samples, lobes=lobes, metric=METRIC, distribution=distribution, coupled=kept.kd_coupled)
+            found = fit(
+                samples, lobes=lobes, metric=METRIC, distribution=distribution, coupled=kept.kd_coupled,
+                bends_kd=not any(kept.kd),
+            )  # fmt: skip
             kept, warnings = _sum(kept, found.material), found.warnings
     fitted = tuple(term.name for term in edited.terms if term.name in rest)
     samples = EditedTable(edited, name).samples(COMPARED)
@@ -179,7 +182,8 @@ def _common(multiples: list[Floats | None]) -> Floats | None:
 def _sum(one: Material, other: Material) -> Material:
     """The sum of two documents; the diffuse terms of both are coupled, or neither is."""
     kd, kt_d = (triple(np.add(getattr(one, name), getattr(other, name))) for name in ("kd", "kt_d"))
-    return one.model_copy(update={"kd": kd, "kt_d": kt_d, "lobes": (*one.lobes, *other.lobes)})
+    lobes, kd_curve = (*one.lobes, *other.lobes), one.kd_curve if any(one.kd) else other.kd_curve
+    return one.model_copy(update={"kd": kd, "kt_d": kt_d, "kd_curve": kd_curve, "lobes": lobes})
 
 
 def _provenance(

@@ -309,7 +309,14 @@ class _Trial:
 
 
 def fit_curve(
-    problem: Problem, mixtures: Sequence[Mixture], box: Box, diffuse_free: bool, seed: int, progress: Progress
+    problem: Problem,
+    mixtures: Sequence[Mixture],
+    box: Box,
+    seed: int,
+    progress: Progress,
+    *,
+    diffuse_free: bool = True,
+    may_bend_kd: bool = True,
 ) -> CurveFit:
     """The best curve lobe, from the mirroring lobes of each mixture; the retro lobe of the last one stays.
 
@@ -319,6 +326,8 @@ def fit_curve(
     ----------
     box : Box
         Of a lobe: ends of alpha; whether mx and my are one number.
+    diffuse_free, may_bend_kd : bool
+        Whether the diffuse coefficients may change, and whether the diffuse term may get a curve.
     """
     mixture, channels = mixtures[-1], len(problem.measured)
     others = replace(mixture, lobes=tuple(one for one in mixture.lobes if one.retro))
@@ -337,7 +346,7 @@ def fit_curve(
     best, start = min(((attempt(*one), one[0]) for one in starts), key=lambda pair: pair[0].error)
     best = min([best, *(attempt(start, strength) for strength in STRENGTHS[1:])], key=lambda one: one.error)
     power = 1 / problem.metric.power
-    if diffuse_free and np.any(mixture.diffuse > DARK):
+    if diffuse_free and may_bend_kd and np.any(mixture.diffuse > DARK):
         bent = attempt(start, best.strength, True)
         best = bent if bent.error**power < (1 - KD_GAIN) * best.error**power else best
     progress(rounds - 1, rounds, f"curve lobe, {len(final)} tuples")

@@ -57,6 +57,7 @@ class Task:
     seed: int
     kept: dict[Side, Curve]  # albedos that the model must match
     retro: bool | None = None
+    bends_kd: bool = True
 
 
 def fit(
@@ -72,6 +73,7 @@ def fit(
     gain: float = GAIN,
     whole: MeasuredTable | None = None,
     keep_albedo: bool = False,
+    bends_kd: bool = True,
     search: Search = gradient.fit_lobes,
     seed: int = 0,
     source: Path | None = None,
@@ -106,6 +108,8 @@ def fit(
         The table of the tuples, for its albedos; by default `table`, if that is a MeasuredTable.
     keep_albedo : bool
         Whether the albedo over theta_i must match the table's, per channel (`account.KEEP`).
+    bends_kd : bool
+        Whether the diffuse reflection of a curve lobe's material may get a curve; not if `coupled`.
     search : callable
         The method; by default least squares from several starts, all lobes and the diffuse term jointly.
     seed : int
@@ -136,7 +140,7 @@ def fit(
     samples = table if isinstance(table, MeasuredSamples) else table.samples()
     curves = account.curves_of(whole, samples) if whole is not None else {}
     kept = curves if keep_albedo else {}
-    task = Task(count, share, search, metric_named(metric), kinds, coupled, fix, ranges, seed, kept, retro)
+    task = Task(count, share, search, metric_named(metric), kinds, coupled, fix, ranges, seed, kept, retro, bends_kd)
     far = [name for name in [*fix, *ranges] if name.startswith(("t_", "kt"))]
     if far and not samples.transmitted.any():
         raise UserError("the table does not transmit", file=samples.info.file, field=far[0])
@@ -226,7 +230,11 @@ def _curve_of(found: Found, side: Side, task: Task, progress: Progress) -> Curve
     models = [model for model in found.models if any(not lobe.retro for lobe in model.lobes)]
     box = next(box for box in found.boxes if not box.retro)
     free = ("kd" if side == "reflection" else "kt_d") not in task.fix
-    return fit_curve(found.problem, [models[0], *models[1:][-1:]], box, free, task.seed, progress)
+    may_bend_kd = side == "reflection" and not task.coupled and task.bends_kd
+    return fit_curve(
+        found.problem, [models[0], *models[1:][-1:]], box, task.seed, progress,
+        diffuse_free=free, may_bend_kd=may_bend_kd,
+    )  # fmt: skip
 
 
 def _worth(curve: CurveFit, found: Found, lobes: Lobes) -> tuple[bool, str]:

@@ -129,7 +129,7 @@ def _numbers(editor: Editor, material: Material) -> tuple[Material, bool]:
     changed, coupled = imgui.checkbox("kd falls as Fresnel rises", material.kd_coupled)
     explain("couples diffuse reflection to the lobes: kd becomes the albedo at normal incidence; a fit keeps this")
     if changed:
-        renamed = renamed.model_copy(update={"kd_coupled": coupled})
+        renamed = renamed.model_copy(update={"kd_coupled": coupled, "kd_curve": None})
     imgui.text_disabled("fix")
     explain("a fit keeps fixed parameters; <> limits the range of a parameter in a fit")
 

@@ -100,8 +100,10 @@ def _lobe(index: int, lobe: Lobe, linked: bool, line: Line, heading: Callable[[i
         lobe = heading(index, lobe)
     values = {}
     for name, parameter in (RETRO if lobe.retro else LOBE).items():
+        imgui.begin_disabled(name == "r0" and lobe.fresnel is not None)  # of a curve, the value at normal incidence
         with line(index, name):
             values[name] = _parameter(parameter, lobe)
+        imgui.end_disabled()
     after = lobe.model_copy(update=values)
     imgui.pop_id()
     return _linked(lobe, after) if linked else after
