@@ -196,8 +196,7 @@ class _Descent:
         matrix, gradient = np.zeros((count, count)), np.zeros(count)
         for block in self.problem.blocks:
             terms = Terms(block, model, self._background(block))
-            for channel, target in enumerate(block.target):
-                value = block.c * terms.f[channel]
+            for channel, (target, value) in enumerate(zip(block.target, block.c * terms.f, strict=True)):
                 residual = target - block.metric.transform(value)
                 w = reweighted(block, target, residual)
                 rows = terms.rows(channel) * (block.c * block.metric.slope(value))
