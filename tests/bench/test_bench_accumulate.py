@@ -47,9 +47,9 @@ def test_edits_of_all_kinds_show(folder: Path, monkeypatch: pytest.MonkeyPatch) 
     report = edits.run(effort, inputs=[folder])
     baked, *edited = report["rows"]
     assert baked["edit"] == "as baked" and baked["unedited_flip"] == pytest.approx(baked["flip"], rel=0.05)
-    colour, look, lamp, again = edited
+    colour, look, lamp, curve = edited
     assert colour["edit"].endswith("blue") and " as " in look["edit"] and lamp["edit"] == "lamp warm"
-    assert again["edit"].endswith("light")
+    assert curve["edit"].endswith("diffuse pulled")
     for row in edited:
         assert row["flip"] < row["unedited_flip"] and row["left_unedited"] == 0, row
         assert row["flip"] < 2 * baked["flip"] and row["relative_error"] < 0.1, row

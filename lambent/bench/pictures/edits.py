@@ -148,11 +148,11 @@ def edits_for(store: Store, scene: Scene, camera: Camera, most: int) -> dict[str
     placed = [(name, of) for name in seen if name not in bare for of in images if of != name]
     kinds = (
         {f"{name} {word}": Edit(colours={name: to}) for name in seen[:4] for word, to in COLOURS.items()},
-        {f"{name}, {what}": Edit({name: look}) for name in seen[:3] for what, look in _curved(scene, name).items()},
         {f"{name} as {of}": Edit({name: _look(scene, name, of)}) for name, of in pairwise(seen[:5])},
         {f"texture of {of} on {name}": Edit(textures={name: of}) for name, of in placed[:2]},
         {f"{lamp} off": Edit(light={lamp: (0.0, 0.0, 0.0)}) for lamp in lamps[:2] if len(lamps) > 1},
         {f"{lamp} warm": Edit(light={lamp: WARM}) for lamp in lamps[:2]},
+        {f"{name}, {what}": Edit({name: look}) for name in seen[:3] for what, look in _curved(scene, name).items()},
         {f"sky turned by {turn:g}": Edit(sky_turn_deg=turn) for turn in TURNS_DEG if scene.environment is not None},
     )
     in_turn = [one for turn in zip_longest(*(kind.items() for kind in kinds)) for one in turn if one is not None]

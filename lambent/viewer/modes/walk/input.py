@@ -42,7 +42,7 @@ SHORTCUTS = (
     ("R", "record a walk, or stop"),
     ("X", "swap the room with the state beside it, or with the bake"),
     ("Ctrl+Z / Ctrl+Shift+Z, Ctrl+Y", "undo / redo a change of a material or the light"),
-    ("Ctrl+S", "save the session with the store"),
+    ("Ctrl+S", "write the session now; it is saved by itself"),
     ("Ctrl+Q", "close the window"),
     ("P", "save the picture (PNG and EXR)"),
     ("H", "hide or show the panels"),
