@@ -129,7 +129,9 @@ def draw(mode: Mode, textures: Textures | None = None) -> bool:
     list_open = bool(imgui.is_popup_open("", imgui.PopupFlags_.any_popup))
     follow_keys(screen, "panels" if shared.column.width else "bar", list_open or screen.list_open)
     screen.list_open = list_open
-    return dragged or list_open or bool(imgui.is_window_hovered(imgui.HoveredFlags_.any_window))
+    # Only what lies over the picture: the mouse may come from the column by one event, before a frame sees it.
+    over_it = shared.picture.holds(*imgui.get_mouse_pos()) and imgui.is_window_hovered(imgui.HoveredFlags_.any_window)
+    return dragged or list_open or bool(over_it)
 
 
 def follow_keys(screen: Screen, window: str, list_open: bool) -> None:

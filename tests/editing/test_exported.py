@@ -73,7 +73,7 @@ def test_curves_that_are_multiples_stay_exact() -> None:
     found = export(one, "it")
     assert not found.fitted
     assert np.allclose(found.material.lobes[0].k, [0.25, 0.5, 0.5])
-    assert np.allclose(found.material.kd, 0.4)
+    assert np.allclose(found.material.kd, 0.8)  # the curve counts for both directions
     assert close_to(one, found.material)
 
 
@@ -115,6 +115,18 @@ def test_a_curve_lobe_is_opened_and_closed_without_a_fit() -> None:
     assert found.fitted == () and found.verdict.word == "faithful" and found.shares["l1"] < 0.03
     again = session(found.material)
     assert export(again, "it").material.lobes == found.material.lobes
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+def test_a_diffuse_curve_is_that_of_the_document(coupled: bool) -> None:
+    """It counts for both directions; a coupled term's fall towards grazing becomes part of it."""
+    one = session(Material(kd=(0.5, 0.3, 0.1), kd_coupled=coupled, lobes=(ROUND,)))
+    values = one.editable("it").curves["diffuse"].values
+    one.draw("it", "diffuse", Curve(values * np.linspace(1.2, 0.6, len(values))[:, None]))
+    found = export(one, "it")
+    assert found.fitted == () and found.material.kd_curve is not None and not found.material.kd_coupled
+    assert found.material.lobes == (ROUND,) and found.shares["l1"] < 0.08
+    assert export(session(found.material), "it").material.kd_curve == found.material.kd_curve
 
 
 def test_a_ring_about_the_highlight_is_a_curve_lobe() -> None:

@@ -86,6 +86,8 @@ def expected(whole: Interreflections, materials: dict[str, Editable], hits: tupl
                 bands, scale = bands_of(edited.factors, term.counts, materials[name]), np.array(edited.scale)
             tail, band = np.divmod(term.codes, len(bands))
             point = np.repeat(np.arange(len(part.pixel)), np.diff(term.ends))
+            if part.edited and edited.viewer:
+                scale = scale * viewed(part.theta_o, materials[name].curves[edited.viewer]).T[point]
             values = unpacked_rgb(term.values) * term.units[point, None]
             np.add.at(image, part.pixel[point], values * weights[tail] * bands[band] * scale)
     return image.reshape(*SIZE, 3)

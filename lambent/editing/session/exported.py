@@ -141,9 +141,10 @@ def _kept(document: Material, start: Editable, edited: Editable) -> tuple[Materi
     for name, coefficient in (("diffuse", "kd"), ("diffuse through", "kt_d")):
         by = multiples.get(name, np.ones(3))
         of_kd = next((term for term in edited.terms if term.name == name and term.viewer), None)
-        if by is None and of_kd is not None and (nodes := as_kd_curve(edited.curves[name])):
-            changes["kd_curve"], squared = nodes
-            by = squared * np.pi * np.array(of_kd.scale) / np.maximum(getattr(document, coefficient), 1e-30)
+        if by is None and of_kd is not None and (nodes := as_kd_curve(edited.curves[name], document.kd_coupled)):
+            changes |= {"kd_curve": nodes[0], "kd_coupled": False}
+            unit = 1.0 if document.kd_coupled else np.pi
+            by = nodes[1] * unit * np.array(of_kd.scale) / np.maximum(document.kd, 1e-30)
         if by is None:
             rest.add(name)
         changes[coefficient] = triple(np.multiply(getattr(document, coefficient), 0.0 if by is None else by))
@@ -155,7 +156,8 @@ def _multiples(start: Editable, edited: Editable) -> dict[str, Floats | None]:
     found: dict[str, Floats | None] = {}
     for before, after in zip(start.terms, edited.terms, strict=True):
         scale = np.divide(after.scale, before.scale, out=np.ones(3), where=np.array(before.scale) != 0)
-        factors = [_multiple(start.curves[name], edited.curves[name]) for name in before.curves]
+        used = [*(factor.curve for factor in before.factors), *([before.viewer] if before.viewer else [])]
+        factors = [_multiple(start.curves[name], edited.curves[name]) for name in used]
         known = [factor for factor in factors if factor is not None]
         found[before.name] = scale * np.prod([np.ones(3), *known], axis=0) if len(known) == len(factors) else None
     return found

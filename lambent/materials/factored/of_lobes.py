@@ -9,12 +9,13 @@ import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.plain import triple
-from lambent.materials.document import COEFFICIENT_MAX, COSINE_NODES, Lobe, Material
+from lambent.materials.bsdf import under_fresnel
+from lambent.materials.document import COEFFICIENT_MAX, Lobe, Material
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.quotients import CoupledDiffuse, Microfacets, One
 from lambent.materials.factored.terms import Editable, Factor, Term
 from lambent.materials.lobes import NUMPY, density_of_slopes, tint
-from lambent.materials.slope_curve import NODES_RHO, ROW, at_cosine, normalised, slope_table
+from lambent.materials.slope_curve import NODES_COSINE, NODES_RHO, ROW, at_cosine, normalised, slope_table
 
 STEEPEST_RAD = 1.57  # beyond, the squared tangent overflows the curve's range
 SAME = 1e-3  # relative difference up to which channels share a curve
@@ -80,7 +81,7 @@ def as_curve_lobe(lobe: Lobe, curves: Mapping[str, Curve], scale: Floats, prefix
     if np.abs(density - size * shape[:, None]).max() > SAME * size.max():
         return None
     mass = np.exp(-slope_table(tuple(shape.tolist()))[::ROW].max())  # twice the integral of the shape over rho drho
-    tint = fresnel.at(np.arccos(np.linspace(0, 1, COSINE_NODES))) * (size * mass * np.asarray(scale))
+    tint = fresnel.at(np.arccos(NODES_COSINE)) * (size * mass * np.asarray(scale))
     k = tint.max(axis=0)
     share = np.divide(tint, k, out=np.zeros_like(tint), where=k > 0)
     if (tint < 0).any() or not (k <= COEFFICIENT_MAX).all():
@@ -90,12 +91,15 @@ def as_curve_lobe(lobe: Lobe, curves: Mapping[str, Curve], scale: Floats, prefix
     return Lobe.model_validate(lobe.model_dump() | update)
 
 
-def as_kd_curve(curve: Curve) -> tuple[tuple[float, ...], Floats] | None:
-    """Nodes of the `kd_curve` that an edited curve of a reciprocal diffuse term is, and the factor (3,) of kd, or None.
+def as_kd_curve(curve: Curve, coupled: bool) -> tuple[tuple[float, ...], Floats] | None:
+    """Nodes of the `kd_curve` that an edited curve of the diffuse term is, and the factor (3,) of kd; or None.
 
-    One curve serves all channels: None if they are no multiples of each other.
+    The factors t of a coupled term become part of the curve. One curve serves all channels: None if they are no
+    multiples of each other.
     """
-    nodes = curve.at(np.arccos(np.linspace(0, 1, COSINE_NODES)))
+    nodes = curve.at(np.arccos(NODES_COSINE))
+    if coupled:
+        nodes = nodes * np.sqrt(21 / 20) * under_fresnel(NODES_COSINE)[:, None]
     size = nodes.max(axis=0)
     shape = nodes[:, int(np.argmax(size))] / max(size.max(), 1e-30)
     if (nodes < 0).any() or size.max() <= 0 or np.abs(nodes - size * shape[:, None]).max() > SAME * size.max():
@@ -140,9 +144,8 @@ def of_material(material: Material) -> Editable:
         quotient, scale = (CoupledDiffuse(), 1.0) if material.kd_coupled else (One(), 1 / np.pi)
         bent = material.kd_curve
         curves["diffuse"] = Curve.constant() if bent is None else _over_cosine(normalised(bent))
-        viewer = None if bent is None else "diffuse"
         scale_r = triple(scale * np.array(material.kd))
-        terms.append(Term("diffuse", quotient, scale_r, (Factor("diffuse", "theta_i"),), viewer=viewer))
+        terms.append(Term("diffuse", quotient, scale_r, (Factor("diffuse", "theta_i"),), viewer="diffuse"))
     if any(material.kt_d):
         scale_t = triple(np.array(material.kt_d) / np.pi)
         factor = Factor("diffuse through", "theta_i")

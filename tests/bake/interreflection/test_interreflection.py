@@ -17,6 +17,7 @@ from lambent.baked.shared_exponent import unpacked_rgb
 from lambent.baked.transport.tails import FIXED, Tails
 from lambent.core.errors import UserError
 from lambent.core.views.camera import Camera
+from lambent.editing.canvas import viewed
 from lambent.editing.interreflection.powers import bands_of
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.albedo import albedo
@@ -68,7 +69,7 @@ def picture(
     weights = tails.weights(albedos, second_coefficients(tails, materials))
     if hits is not None:
         weights[tails.hits != hits] = 0
-    number = store.read(view.name("view_points", "object"))
+    number, theta_o = (store.read(view.name("view_points", part)) for part in ("object", "theta_o"))
     worn = np.array([o.material for o in scene.objects])[number]
     total = np.zeros((len(worn), 3))
     tiles = [a for a in store.artefacts("interreflection") if a.name.count("/") > 3]
@@ -86,6 +87,8 @@ def picture(
         mine = np.flatnonzero(worn == name)
         first = int(place) * store.artefact(tile.name.rpartition("/")[0] + "/0").meta["points"]  # the last is shorter
         at = np.repeat(mine[first : first + points], entries)
+        if tile.meta["term"] >= 0 and shown.viewer:
+            scale = scale * viewed(theta_o, materials[name].curves[shown.viewer]).T[at]
         np.add.at(total, at, light * weights[tail] * coefficients[band] * scale)
     return total
 

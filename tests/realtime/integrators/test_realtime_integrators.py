@@ -90,7 +90,7 @@ def test_few_samples_come_close_under_smooth_light(device, name: str) -> None:
     renderer = Renderer(device, wall_scene(material(MATERIALS[name]), cube_of(smooth_light)))
     truth = renderer.converged(STATE, 2048)
     for integrator, tolerance in (("rings", 0.05), ("fis", 0.05), ("lobe-4.25", 0.25)):
-        # The published pattern ends at a border that holds 99 % of a Beckmann lobe; GGX and the curve have no such border.
+        # The published pattern ends at a border that holds 99 % of a Beckmann lobe; the others have no such border.
         if (name, integrator) not in (("ggx", "lobe-4.25"), ("curve", "lobe-4.25")):
             image = renderer.image(replace(STATE, integrator=integrator, n=19))
             assert np.abs(image - truth).mean() < tolerance * truth.mean(), integrator
