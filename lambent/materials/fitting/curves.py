@@ -115,9 +115,10 @@ class Terms:
         self._of_diffuse = [_hats(-schlick_weight(c), -schlick_weight(NODES_COSINE)) for c in block.cosines]
         self._block, self._model, self.background = block, model, background
         log_p = _at(model.shape, self._hats[0]) + block.base[0] - 2 * np.log(model.m) - alpha * block.log_cosines
-        self.lobe = np.exp(log_p + _at(model.tint, self._hats[1]))  # (C, N)
-        curve = sum(_at(model.kd_curve, hats) for hats in self._of_diffuse)
-        self.diffuse = np.exp(model.diffuse[:, None] + curve) * block.diffuse
+        self._tint = _at(np.exp(model.tint), self._hats[1])  # (C, N): curves over cosines are not linear in logarithms
+        self.lobe = np.exp(log_p) * self._tint
+        self._curve = [_at(np.exp(model.kd_curve), hats) for hats in self._of_diffuse]
+        self.diffuse = np.exp(model.diffuse[:, None]) * self._curve[0] * self._curve[1] * block.diffuse
 
     @property
     def f(self) -> Floats:
@@ -129,17 +130,19 @@ class Terms:
         model, n = self._model, len(self._slope2)
         rows = np.zeros((model.vector.size, n))
         lobe, diffuse, channels = self.lobe[channel], self.diffuse[channel], len(model.diffuse)
-        _scatter(rows, 0, self._hats[0], lobe)
+        _scatter(rows, 0, self._hats[0], lobe, np.zeros(SHAPE_NODES))
         first = SHAPE_NODES
-        _scatter(rows, first + channel * COSINE_NODES, self._hats[1], lobe)
+        _scatter(
+            rows, first + channel * COSINE_NODES, self._hats[1], lobe / self._tint[channel], model.tint[channel]
+        )  # fmt: skip
         first += channels * COSINE_NODES
         low, _ = self._hats[0]
         power = np.diff(model.shape)[low] / np.diff(NODES_LOG)[low]
         rows[first] = -self._block.log_cosines * lobe
         rows[first + 1] = power / (1 + self._slope2) * self._difference * lobe
         rows[first + 2 + channel] = diffuse
-        for hats in self._of_diffuse:
-            _scatter(rows, first + 2 + channels, hats, diffuse)
+        for hats, curve in zip(self._of_diffuse, self._curve, strict=True):
+            _scatter(rows, first + 2 + channels, hats, diffuse / curve, model.kd_curve)
         return rows
 
 
@@ -149,12 +152,12 @@ def _at(values: Floats, hats: tuple[NDArray[np.int64], Floats]) -> Floats:
     return np.asarray(values[..., low] * (1 - share) + values[..., low + 1] * share)
 
 
-def _scatter(rows: Floats, first: int, hats: tuple[NDArray[np.int64], Floats], term: Floats) -> None:
-    """Add the derivatives of a term by the nodes from row `first` on."""
-    low, share = hats
+def _scatter(rows: Floats, first: int, hats: tuple[NDArray[np.int64], Floats], term: Floats, log_nodes: Floats) -> None:
+    """Add the derivatives of a term by the logarithms of its nodes, from row `first` on."""
+    (low, share), nodes = hats, np.exp(log_nodes)
     at = np.arange(len(low))
-    rows[first + low, at] += (1 - share) * term
-    rows[first + 1 + low, at] += share * term
+    rows[first + low, at] += (1 - share) * nodes[low] * term
+    rows[first + 1 + low, at] += share * nodes[low + 1] * term
 
 
 @dataclass(frozen=True)
