@@ -214,10 +214,15 @@ def mean_reflectance(cos_d: Any, lobe: Lobe, ops: Any = NUMPY) -> Any:
     return sum(reflectance(cos_d, lobe, c, ops) for c in range(3)) / 3
 
 
-def tint(cos_d: Any, lobe: Lobe, channel: int, ops: Any = NUMPY) -> Any:
-    """k times Fresnel: F for reflection (3.4), 1 - F for transmission (3.5)."""
+def passed(cos_d: Any, lobe: Lobe, channel: int, ops: Any = NUMPY) -> Any:
+    """Fresnel's factor: F for reflection (3.4), 1 - F for transmission (3.5)."""
     f = reflectance(cos_d, lobe, channel, ops)
-    return lobe.k[channel] * (f if lobe.side == "reflection" else 1 - f)
+    return f if lobe.side == "reflection" else 1 - f
+
+
+def tint(cos_d: Any, lobe: Lobe, channel: int, ops: Any = NUMPY) -> Any:
+    """k times Fresnel's factor."""
+    return lobe.k[channel] * passed(cos_d, lobe, channel, ops)
 
 
 def evaluate(wi: Vector, wo: Vector, lobe: Lobe, ops: Any = NUMPY) -> Vector:

@@ -67,7 +67,12 @@ def with_values(material: Material, which: Which, values: Floats) -> Material:
         return _with_diffuse(material, values[:, 0])
     lobe = material.lobes[which.lobe]
     changed = (_with_shape if which.kind == "shape" else _with_fresnel)(lobe, np.maximum(values, 0.0))
-    lobes = (*material.lobes[: which.lobe], changed, *material.lobes[which.lobe + 1 :])
+    return with_lobe(material, which.lobe, changed)
+
+
+def with_lobe(material: Material, number: int, lobe: Lobe) -> Material:
+    """The material with another lobe in place of one."""
+    lobes = (*material.lobes[:number], lobe, *material.lobes[number + 1 :])
     return material.model_copy(update={"lobes": lobes})
 
 
@@ -109,8 +114,7 @@ def copied(material: Material, which: Which, other: Material) -> Material | None
         changed = lobe.model_copy(
             update={"distribution": "curve", "shape": curve.shape, "mx": source.mx, "my": source.my}
         )
-    lobes = (*material.lobes[: which.lobe], changed, *material.lobes[which.lobe + 1 :])
-    return material.model_copy(update={"lobes": lobes})
+    return with_lobe(material, which.lobe, changed)
 
 
 def _with_shape(lobe: Lobe, values: Floats) -> Lobe:

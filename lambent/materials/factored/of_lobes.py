@@ -14,7 +14,7 @@ from lambent.materials.document import COEFFICIENT_MAX, Lobe, Material
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.quotients import CoupledDiffuse, Microfacets, One
 from lambent.materials.factored.terms import Editable, Factor, Term
-from lambent.materials.lobes import NUMPY, density_of_slopes, tint
+from lambent.materials.lobes import NUMPY, density_of_slopes, passed
 from lambent.materials.slope_curve import NODES_COSINE, NODES_RHO, ROW, at_cosine, normalised, slope_table
 
 STEEPEST_RAD = 1.57  # beyond, the squared tangent overflows the curve's range
@@ -130,8 +130,7 @@ def lobe_terms(lobe: Lobe, prefix: str = "") -> tuple[tuple[Term, ...], dict[str
         sign = -1 if across else 1
         normal = term("specular", k * (1 - r0 if across else r0), highlight.factors)
         return (normal, term("grazing", sign * k * (1 - r0), highlight.factors, grazing=True)), highlight.curves
-    one = lobe.model_copy(update={"k": (1.0, 1.0, 1.0)})
-    fresnel = Curve.of(lambda x: np.stack([tint(np.maximum(np.cos(x), 0), one, c) for c in range(3)], axis=-1))
+    fresnel = Curve.of(lambda x: np.stack([passed(np.maximum(np.cos(x), 0), lobe, c) for c in range(3)], axis=-1))
     factors = (*highlight.factors, Factor(f"{prefix}fresnel", "theta_d"))
     return (term("specular", k, factors),), {**highlight.curves, f"{prefix}fresnel": fresnel}
 

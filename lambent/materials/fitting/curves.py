@@ -187,12 +187,8 @@ class _Descent:
         channels, count = len(model.diffuse), model.vector.size
         starts = [(0, SHAPE_NODES), *((SHAPE_NODES + c * COSINE_NODES, COSINE_NODES) for c in range(channels))]
         starts.append((count - COSINE_NODES, COSINE_NODES))
-        rows = [
-            np.eye(count)[first + i - 1] - 2 * np.eye(count)[first + i] + np.eye(count)[first + i + 1]
-            for first, nodes in starts
-            for i in range(1, nodes - 1)
-        ]
-        return np.stack(rows)
+        each = np.eye(count)
+        return np.concatenate([np.diff(each[first : first + nodes], 2, axis=0) for first, nodes in starts])
 
     def _equations(self, model: CurveModel) -> tuple[Floats, Floats]:
         count = model.vector.size

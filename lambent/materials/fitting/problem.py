@@ -20,7 +20,7 @@ from lambent.materials.document import Distribution, Lobe, Side
 from lambent.materials.fitting.parameters import Box, from_search
 from lambent.materials.fitting.scale import Channel
 from lambent.materials.fresnel import schlick_weight
-from lambent.materials.lobes import density_of_slopes, tint
+from lambent.materials.lobes import density_of_slopes, passed
 from lambent.materials.measured.inspecting.metrics import BLOCK, Metric
 from lambent.materials.measured.protocol import MeasuredSamples
 
@@ -114,8 +114,7 @@ class Problem:
         slope2 = self.slope_x2[which] / lobe.mx**2 + self.slope_y2[which] / lobe.my**2
         log_rest = self.base[which] - np.log(lobe.mx * lobe.my) - lobe.alpha * self.log_cosines
         density = density_of_slopes(slope2, lobe) * np.exp(log_rest)
-        plain = lobe.model_copy(update={"k": (1.0, 1.0, 1.0)})
-        return np.stack([density * tint(self.cos_d[which], plain, c) for c in range(len(self.measured))])
+        return np.stack([density * passed(self.cos_d[which], lobe, c) for c in range(len(self.measured))])
 
     def log_derivatives(self, shape: Floats, tied: bool, retro: bool = False) -> tuple[Floats, Floats, Floats, Floats]:
         """Derivatives (N,) of ln basis by ln mx (with ln my if `tied`), ln my, ln r0 and alpha."""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import normalize
 from lambent.materials.document import Lobe
-from lambent.materials.lobes import mean_reflectance, tint, widths
+from lambent.materials.lobes import mean_reflectance, passed, widths
 from lambent.realtime.integrators.patterns import lobe_points, rings_table
 
 FACTORS = 32  # at cos_o = (i + 1/2)/FACTORS, four to a row: FACTOR_ROWS in rings.wgsl
@@ -70,8 +70,7 @@ def albedo_table(lobe: Lobe, samples: int = 1024) -> Floats:
     """
     slopes = np.sqrt(lobe.mx * lobe.my) * lobe_points(samples, lobe)
     cos_d, g = gains(lobe, slopes, (np.arange(TABLE_ROWS) + 0.5) / TABLE_ROWS)
-    one = lobe.model_copy(update={"k": (1.0, 1.0, 1.0)})
-    albedos = [(tint(np.clip(cos_d, 0, 1), one, c) * g).mean(axis=1) for c in range(3)]
+    albedos = [(passed(np.clip(cos_d, 0, 1), lobe, c) * g).mean(axis=1) for c in range(3)]
     return np.column_stack([*albedos, np.zeros(TABLE_ROWS)]).astype(np.float32)
 
 

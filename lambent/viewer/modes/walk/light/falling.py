@@ -62,7 +62,7 @@ class FallingLight:
     store: Store
     groups: Callable[[], GroupArrays | None]
     found: Fallen | None = None
-    _of: object = None  # what `found` is, or will be, of
+    _of: tuple[frozenset[str], int] | None = None  # what `found` is, or will be, of
     _work: Work | None = field(default=None, repr=False)
 
     @property
@@ -75,7 +75,7 @@ class FallingLight:
         groups = self.groups()
         wanted = (parts, id(groups))
         if wanted != self._of and self._work is None and not waits:
-            if self._of is None or parts != self._of[0]:  # type: ignore[index]
+            if self._of is None or parts != self._of[0]:
                 self.found = None
             self._of = wanted
 

@@ -18,6 +18,7 @@ from lambent.editing.curves.nodes import (
     pulled,
     smoothed,
     values_of,
+    with_lobe,
     with_values,
 )
 from lambent.materials.document import Material
@@ -175,10 +176,7 @@ def _reset(material: Material, scene: Material, which: Which) -> Material:
     if which.lobe >= len(scene.lobes):
         return material
     names = ("distribution", "shape", "mx", "my", "k") if which.kind == "shape" else ("fresnel", "r0", "k")
-    lobe = _like(material.lobes[which.lobe], scene.lobes[which.lobe], names)
-    return material.model_copy(
-        update={"lobes": (*material.lobes[: which.lobe], lobe, *material.lobes[which.lobe + 1 :])}
-    )
+    return with_lobe(material, which.lobe, _like(material.lobes[which.lobe], scene.lobes[which.lobe], names))
 
 
 def _like(one: Any, other: Any, names: tuple[str, ...]) -> Any:
