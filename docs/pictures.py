@@ -76,20 +76,22 @@ def edit() -> None:
     from lambent.bake.bake import bake
     from lambent.bake.quality import quality_named
     from lambent.bake.transport.view import View
-    from lambent.editing.curves.operators import Region
+    from lambent.editing.curves.nodes import Which, values_of, with_values
     from lambent.editing.session.session import Session
     from lambent.editing.stored import edited_picture
     from lambent.scenes import load_scene
 
-    scene = load_scene("builtin:teatray")
-    session = Session.new("builtin:teatray", scene.cameras[0], {"glaze": scene.materials["glaze"]})
+    scene, which = load_scene("builtin:teatray"), Which("shape")
+    glaze = scene.materials["glaze"]
+    session = Session.new("builtin:teatray", scene.cameras[0], {"glaze": glaze})
     quality = quality_named("normal").changed("picture", visibility={"lights": (4000,)})
     with TemporaryDirectory() as folder:
         views = [View(scene.cameras[0], 512, 512)]
         picture = edited_picture(bake(scene, Path(folder), quality=quality, only={"transport"}, views=views), session)
         before = picture.image()
-        session.pull("glaze", "highlight", Region(a=0.03, b=0.15, c=0.2, d=0.4), y=2.5)
-        session.tint("glaze", "diffuse", (4.0, 0.6, 0.25))
+        values = values_of(glaze, which)
+        values[10:14] += 0.016  # between 6 and 16 degrees
+        session.change("glaze", with_values(glaze, which, values).model_copy(update={"kd": (0.22, 0.1, 0.05)}))
         picture.show("glaze", session.editable("glaze"))
         picture.draw()
         both = [to_bytes(srgb_encode(filmic(image, scene.exposure_ev))) for image in (before, picture.image())]
@@ -105,7 +107,7 @@ def interreflections(samples: int = 512) -> None:
     from lambent.bake.quality import quality_named
     from lambent.bake.reference.path_traced import render_reference
     from lambent.bake.transport.view import View
-    from lambent.editing.curves.operators import Region
+    from lambent.editing.curves.nodes import Which, values_of, with_values
     from lambent.editing.interreflection.stored import interreflections as stored
     from lambent.editing.interreflection.whole import WholePicture
     from lambent.editing.session.session import Session
@@ -124,9 +126,11 @@ def interreflections(samples: int = 512) -> None:
         )  # fmt: skip
         whole = WholePicture(edited_picture(store, session))
         whole.give(stored(store, camera, size, start), start)
-        session.tint("left_wall", "diffuse", (0.3, 4.0, 9.0))
-        session.tint("right_wall", "diffuse", (4.5, 1.0, 0.8))
-        session.pull("floor", "highlight", Region(a=-0.1, b=0.0, c=0.1, d=0.3), y=5.0)
+        for wall, kd in (("left_wall", (0.19, 0.26, 0.45)), ("right_wall", (0.63, 0.45, 0.07))):
+            session.change(wall, scene.materials[wall].model_copy(update={"kd": kd}))
+        values = values_of(scene.materials["floor"], Which("shape"))
+        values[:8] += 0.35  # up to 9 degrees
+        session.change("floor", with_values(scene.materials["floor"], Which("shape"), values))
         edited = {name: session.editable(name) for name in scene.materials}
         for name, material in edited.items():
             whole.show(name, material)

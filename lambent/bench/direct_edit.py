@@ -1,7 +1,8 @@
 """`direct-edit`: editing the materials of a view, from the bake to the frame, against path tracing with a denoiser.
 
 A row is a scene with a number of lights, baked separately into an empty store with compiled kernels. Frames are those
-of dragging one highlight, with `show`, `step` and `image`; the row `full frame` has synthetic transport of 256 bands in
+of a drag, with `show`, `step` and `image`: a soft pull of the highlight's first node, which brightens the middle of the
+highlight by 2 % of its value a frame, and leaves its rim. The row `full frame` has synthetic transport of 256 bands in
 every pixel. Errors are those of a picture after an edit that a material document can also express, so that the path
 tracer can draw it: `flip` and `rival_flip` are means over pixels with surfaces, against its converged picture of direct
 light. `rival_seconds` is the time of path tracing, guides and Open Image Denoise with the fewest samples, in powers of
@@ -16,7 +17,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from itertools import islice
+from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ from lambent.core.files import folder_bytes
 from lambent.core.pictures.metrics import display_exposure, displayed
 from lambent.core.plain import triple
 from lambent.core.progress import Progress, silent, tracked
-from lambent.editing.curves.operators import Region
+from lambent.editing.curves.nodes import Which, pulled, values_of, with_lobe, with_values
 from lambent.editing.picture import EditedPicture, Part
 from lambent.editing.rows import Rows
 from lambent.editing.session.session import Session
@@ -50,7 +51,7 @@ NAME = "direct-edit"
 MIB = 2**20
 BANDS = 256  # of the full frame
 SWITCHES = 3  # back and forth
-DRAG = Region(a=-0.1, b=0.0, c=0.1, d=0.4)
+PULLED = 0.02  # of the value before the drag, a frame
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ def _scene_rows(name: str, case: Case, effort: Effort) -> list[dict[str, Any]]:
                 **errors_of_sums(store, session, scene, case.material, picture.image(), effort.checked),
                 **_times(picture, session, case, effort), "memory_mib": round(held_bytes(picture) / MIB, 1),
             }  # fmt: skip
-            session.become(case.material, edited)
+            session.change(case.material, edited)
             picture.show(case.material, session.editable(case.material))
             picture.draw()
             pictures.append(picture.image())
@@ -170,7 +171,8 @@ def _shown(store: Store, session: Session) -> Flags:
 
 def _times(picture: EditedPicture, session: Session, case: Case, effort: Effort) -> dict[str, Any]:
     """Times of frames and switches, and the residual after a random walk."""
-    states, rng = _drag(session, case), np.random.default_rng(0)
+    start = session.material(case.material).now
+    states, rng = drag(start), np.random.default_rng(0)
     picture.show(case.material, next(states))
     picture.draw()
     dense, frames, inexact = [], [], 0
@@ -185,10 +187,8 @@ def _times(picture: EditedPicture, session: Session, case: Case, effort: Effort)
         more += 1
     switches = [_ms(partial(picture.activate, case.material, curve)) for curve in case.curves[::-1] * SWITCHES]
     for _ in range(effort.edits):
-        session.pull(case.material, case.curves[0], DRAG, y=float(rng.uniform(-0.3, 2.0)))
-        picture.show(case.material, session.editable(case.material))
+        picture.show(case.material, of_material(brightened(start, float(rng.uniform(0.7, 3.0)))))
         picture.step()
-        session.undo()
     while not picture.is_exact:
         picture.step()
     walked = picture.image()
@@ -202,15 +202,21 @@ def _times(picture: EditedPicture, session: Session, case: Case, effort: Effort)
     }  # fmt: skip
 
 
-def _drag(session: Session, case: Case) -> Iterator[Editable]:
-    """States of an upward drag, one per frame; curves are prepared before the frame, to exclude the operators' time."""
-    k = 0
-    while True:
-        k += 1
-        session.pull(case.material, case.curves[0], DRAG, y=0.02 * k)
-        state = session.editable(case.material)
-        session.undo()
-        yield state
+def drag(material: Material) -> Iterator[Editable]:
+    """States of a drag, one per frame; curves are made before the frame, to exclude their time."""
+    return (of_material(brightened(material, 1 + PULLED * k)) for k in count(1))
+
+
+def brightened(material: Material, factor: float) -> Material:
+    """The first node of the highlight times a factor, its neighbours by less.
+
+    A Beckmann lobe of two slopes would need new transport for that: its roughness along t grows instead.
+    """
+    lobe, which = material.lobes[0], Which("shape")
+    if lobe.distribution == "beckmann" and lobe.mx != lobe.my:
+        return with_lobe(material, 0, lobe.model_copy(update={"mx": factor * lobe.mx}))
+    values = values_of(material, which)
+    return with_values(material, which, pulled(values, 0, factor * float(values[0, 0]), (0,), soft=True))
 
 
 def _frame(picture: EditedPicture, case: Case, state: Editable) -> None:

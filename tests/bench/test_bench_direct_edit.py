@@ -7,8 +7,12 @@ import numpy as np
 import pytest
 
 from lambent.bench import direct_edit
-from lambent.bench.direct_edit import CASES, Effort, held_bytes, run
+from lambent.bench.direct_edit import CASES, Effort, drag, held_bytes, run
 from lambent.bench.measuring.reference import path_traced
+from lambent.editing.rows import coefficients_of
+from lambent.materials.document import Lobe, Material
+from lambent.materials.factored.of_lobes import of_material
+from lambent.materials.factored.of_models import same_quotients
 
 SMALL = Effort(48, (60,), frames=4, edits=10, reference_spp=64, rival_s=0.5, checked=4)
 
@@ -58,3 +62,23 @@ def test_arrays_are_counted_once() -> None:
     Held.__module__ = "lambent.held"
     array = np.zeros(1000, np.float32)
     assert held_bytes(Held(array, {"part": [array[:10], array]})) == 4000
+
+
+@pytest.mark.parametrize("lobe", [Lobe(mx=0.1, my=0.1), Lobe(mx=0.1, my=0.3, distribution="beckmann")])
+def test_a_drag_is_shown_by_the_transport_of_its_start(lobe: Lobe) -> None:
+    """Each frame brightens or widens the highlight further, by one curve alone."""
+    start = Material(kd=0.2, lobes=(lobe,))
+    frames = drag(start)
+    first, second = next(frames), next(frames)
+    assert same_quotients(of_material(start), first) and same_quotients(first, second)
+    changed = [
+        name for name in first.curves if not np.array_equal(first.curves[name].values, second.curves[name].values)
+    ]
+    assert changed == ["highlight" if lobe.mx == lobe.my else "highlight along"]
+
+
+def test_a_frame_of_a_drag_changes_few_wavelets() -> None:
+    frames = drag(Material(lobes=(Lobe(mx=0.045, my=0.045),)))
+    one, other = (coefficients_of(next(frames).curves["highlight"], 128, 2) for _ in range(2))
+    size = np.abs(other - one).max(axis=1)
+    assert 0 < (size > 1e-3 * size.max()).sum() < 40
