@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
+from lambent.core.plain import triple
 from lambent.editing.session.session import Session
+from lambent.materials.document import Material
 from lambent.scenes import load_scene
 
 SIZE = (24, 16)
@@ -50,11 +54,11 @@ def write_floor(folder: Path) -> Path:
     return folder / "scene.toml"
 
 
-def saved(scene: Path, name: str, **changes: object) -> Path:
+def saved(scene: Path, name: str, start: Material | None = None, **changes: object) -> Path:
     """A session of the floor's paint, half of it in blue."""
     loaded = load_scene(str(scene))
-    start = changes.pop("start", loaded.materials["paint"])
-    session = Session.new("s", loaded.cameras[0], {"paint": start}, size=SIZE, **changes)  # type: ignore[arg-type]
-    session.tint("paint", session.editable("paint").terms[0].name, (1.0, 1.0, 0.5))
+    paint = start or loaded.materials["paint"]
+    session = Session.new("s", loaded.cameras[0], {"paint": paint}, size=SIZE, **changes)  # type: ignore[arg-type]
+    session.change("paint", paint.model_copy(update={"kd": triple(np.multiply(paint.kd, (1.0, 1.0, 0.5)))}))
     session.save(scene.parent / name)
     return scene.parent / name

@@ -20,7 +20,6 @@ from lambent.core.pictures.images import read_encoded, read_image, write_image
 from lambent.core.views.camera import Camera, CameraPath
 from lambent.editing.session.document import Surroundings
 from lambent.materials.document import Material
-from lambent.materials.models import model_named
 from lambent.scenes.geometry import placed, sphere
 from lambent.scenes.scene import Look, Scene, SceneObject, Variant
 from lambent.store.store import Store
@@ -220,7 +219,7 @@ def test_an_error_names_the_command_that_bakes_what_is_missing(lambent, refused,
     sky = Surroundings(file=str(tmp_path / "sky.exr"), scale=3.0)
     lit = drawn_after(saved(scene, "sky.json", environment=sky), "another environment")
     np.testing.assert_allclose(lit, 6 * plain, rtol=0.01)
-    other = model_named("oren-nayar")()
+    other = Material(kd=0.5, kd_coupled=True)
     changed = drawn_after(saved(scene, "other.json", environment=sky, start=other), "other terms")
     assert changed.min() > 0
     again = drawn_after(saved(scene, "plain.json"), "another environment")

@@ -11,7 +11,6 @@ from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.inspecting.synthetic import Setup, synthesise
 from lambent.materials.measured.parts.gonio_text import write_gonio
-from lambent.materials.models import model_named
 from lambent.scenes import load_scene
 from tests.cli.edited_floor import saved, write_floor
 from tests.viewer.small_store import write_small_store
@@ -172,7 +171,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "link.txt").symlink_to("table.txt")
     scene = write_floor(folder)
     saved(scene, "paint.edits.json")
-    stranger = {"wool": model_named("oren-nayar")()}
+    stranger = {"wool": Material(kd=0.5)}
     Session.new("s", load_scene(str(scene)).cameras[0], stranger).save(folder / "wool.edits.json")
     write_small_store(folder / "small.store")
     return folder

@@ -202,7 +202,7 @@ def test_an_edited_view_is_drawn_as_its_session_says(tmp_path: Path) -> None:
     record = SceneRecord(name="small room", objects=(), materials=materials, cameras=(CAMERA,), bounds=bounds)
     with Store.open(tmp_path / "s") as store:
         write_scene_record(store, record)
-    session.tint("wall", "diffuse", 0.5)
+    session.change("wall", WALL.model_copy(update={"kd": (0.25, 0.1, 0.25)}))
     session.save(tmp_path / "s.edits.json")
     done = edited_still(tmp_path / "s", tmp_path / "s.edits.json", tmp_path / "a.exr", replace(SMALL, exposure_ev=0.0))
     picture = whole_picture(Store.open(tmp_path / "s"), session)
