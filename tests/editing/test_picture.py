@@ -9,13 +9,10 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.core.views.camera import Camera
-from lambent.editing.curves.operators import Region
 from lambent.editing.picture import EditedPicture, Part, TransportNeeded
 from lambent.editing.rows import Rows
-from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material
-from lambent.materials.factored.curve import Curve
+from lambent.materials.factored.curve import Curve, angles_rad
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.of_models import editable
 from lambent.materials.factored.quotients import One
@@ -24,7 +21,6 @@ from lambent.materials.models import model_named
 from tests.editing.dense_rows import DensePairs, rows_of
 
 HEIGHT, WIDTH, BANDS = 12, 20, 16
-LOW = Region(a=-0.2, b=0.0, c=0.3, d=0.9)
 
 
 def bands_of(term: Term, pixels: int, seed: int) -> np.ndarray:
@@ -106,27 +102,22 @@ def test_it_is_the_direct_sum(name: str) -> None:
 def test_two_materials_at_once(tray: Editable) -> None:
     pot = editable(model_named("cook-torrance")(m=0.4))
     parts = {"tray": part_of(tray, np.arange(0, 100), 1), "pot": part_of(pot, np.arange(110, 230), 7)}
-    session = Session.new(
-        "room", Camera("v", (0, 0, 1), (0, 0, 0)),
-        {"tray": Material(name="tray", kd=(0.3, 0.2, 0.1), lobes=(Lobe(mx=0.3, my=0.3),)),
-         "pot": model_named("cook-torrance")(m=0.4)},
-    )  # fmt: skip
     background = np.zeros((HEIGHT, WIDTH, 3), np.float32)
     background.reshape(-1, 3)[100:110] = background.reshape(-1, 3)[230:] = 0.25
     picture = EditedPicture(background, {name: part for name, (part, _) in parts.items()})
-    with session.stroke():
-        session.pull("tray", "highlight", LOW, y=1.0)
-        session.pull("pot", "highlight", LOW, y=0.5)
-        session.tint("tray", "diffuse", (1.0, 0.5, 2.0))
+    tinted = (replace(tray.terms[0], scale=(0.2, 0.1, 0.3)), *tray.terms[1:])
+    edited = {"tray": replace(tray, terms=tinted), "pot": pot}
     frames = 0
-    for name in parts:
-        picture.show(name, session.editable(name))
+    for name, by in (("tray", 1.0), ("pot", 0.5)):
+        values = edited[name].curves["highlight"].values
+        edited[name] = edited[name].with_curve("highlight", Curve(values + by * np.cos(angles_rad())[:, None] ** 2))
+        picture.show(name, edited[name])
     while not picture.is_exact:
         picture.step(terms=8)
         frames += 1
     assert frames == 4  # 16 + 16 changed wavelets, 8 a frame; the tint takes none
     for name, (part, bands) in parts.items():
-        assert close(pixels_of(picture.image(), part), direct(part, bands, session.editable(name)))
+        assert close(pixels_of(picture.image(), part), direct(part, bands, edited[name]))
     assert np.all(picture.image().reshape(-1, 3)[100:110] == 0.25)
     assert np.all(picture.image().reshape(-1, 3)[230:] == 0.25)
 

@@ -11,16 +11,16 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.core.pictures.images import read_image
 from lambent.core.views.camera import Camera
-from lambent.editing.curves.operators import Region
+from lambent.editing.curves.nodes import Which
 from lambent.editing.session.session import Session
 from lambent.editing.stored import edited_picture
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
-from lambent.materials.models import model_named
 from lambent.scenes import load_scene
 from lambent.store.contract import SceneRecord, view_artefact_name, write_scene_record
 from lambent.store.store import Store
+from tests.editing.pulled_materials import with_node
 from tests.editing.written_view import SHINES, SHOWN, SIZE, UNIT, Light, write_view
 
 CAMERA = Camera("view", (0.0, 1.0, 3.0), (0.0, 0.0, 0.0))
@@ -29,7 +29,6 @@ MATERIALS = {
     "wall": Material(name="wall", kd=0.5),
 }
 COUNTS = {"diffuse": 4, "highlight": 16, "fresnel": 8}
-LOW = Region(a=-0.2, b=0.0, c=0.3, d=0.9)
 
 
 def light_of(material: str) -> list[Light]:
@@ -59,14 +58,14 @@ def expected(name: str, made: Editable) -> np.ndarray:
     return total
 
 
-def new_session(**materials: object) -> Session:
+def new_session(**materials: Material) -> Session:
     return Session.new("room", CAMERA, materials or {"tray": MATERIALS["tray"]}, size=SIZE)
 
 
 def test_the_picture_is_the_sum_of_what_is_stored(store: Store) -> None:
     session = new_session()
-    session.pull("tray", "highlight", LOW, y=1.0)
-    session.pull("tray", "fresnel", LOW, y=0.5)
+    bright = with_node(MATERIALS["tray"], Which("shape"), 0, 3.0)
+    session.change("tray", with_node(bright, Which("fresnel"), 7, 2.0))
     picture = edited_picture(store, session)
     image = picture.image().reshape(-1, 3)
     rest = np.setdiff1d(np.arange(len(image)), np.concatenate(list(SHOWN.values())))
@@ -81,17 +80,16 @@ def test_what_the_store_does_not_have_is_said(store: Store) -> None:
     with pytest.raises(UserError, match="no transport for camera view, 9 x 9"):
         edited_picture(store, other)
     with pytest.raises(UserError, match="other terms"):
-        edited_picture(store, new_session(tray=model_named("phong")()))
+        edited_picture(store, new_session(tray=Material(kd=0.3)))
     with pytest.raises(UserError, match="unknown material"):
         edited_picture(store, new_session(pot=MATERIALS["tray"]))
     changed = new_session()
-    assert not changed.become(
-        "tray", MATERIALS["tray"].model_copy(update={"lobes": (Lobe(mx=0.3, my=0.3, alpha=0.5),)})
-    )
+    moved = MATERIALS["tray"].model_copy(update={"lobes": (Lobe(mx=0.3, my=0.3, alpha=0.5),)})
+    assert not changed.change("tray", moved)
     with pytest.raises(UserError, match="other terms"):
         edited_picture(store, changed)
     changed.undo()
-    assert changed.become("tray", MATERIALS["tray"].model_copy(update={"lobes": (Lobe(mx=0.5, my=0.5),)}))
+    assert changed.change("tray", MATERIALS["tray"].model_copy(update={"lobes": (Lobe(mx=0.5, my=0.5),)}))
     assert edited_picture(store, changed).is_exact
 
 
