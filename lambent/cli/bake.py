@@ -306,7 +306,7 @@ def _edited(
     if session is None:
         return {"views": views}, frozenset()
     document = session.document
-    changed = frozenset(name for name, one in document.materials.items() if one.curves or one.tints)
+    changed = frozenset(name for name, one in document.materials.items() if one.now != one.start)
     return {
         "views": [*views, View(document.camera, *document.size)],
         "editables": {name: session.original(name) for name in document.materials},

@@ -7,12 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from lambent.core.plain import triple
 from lambent.core.views.camera import Camera
+from lambent.editing.curves.nodes import Which, pulled, values_of, with_values
 from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.store.store import Store
+from lambent.viewer.edits.edits import MaterialEdits
+from lambent.viewer.edits.view_steps import ViewSteps
 from lambent.viewer.modes.edit import painter
 from lambent.viewer.modes.edit.state import EditState
 from lambent.viewer.modes.edit.subject import Subject
@@ -29,6 +33,20 @@ SCENE = Scene(
     tuple(SceneObject(name, patch((-1, 0, -1), (2, 0, 0), (0, 0, 2)), material) for name, material in OBJECTS.items()),
     {"tray": TRAY, "wall": WALL, "unused": WALL}, cameras=(CAMERA, replace(CAMERA, name="side")),
 )  # fmt: skip
+
+
+def pull(session, name, kind="shape", by=2.0, node=0):
+    """Pull a node of a material's curve by a factor, with its neighbours."""
+    material, which = session.material(name).now, Which(kind)
+    values = values_of(material, which)
+    pull = pulled(values, node, by * float(values[node].max()), tuple(range(values.shape[1])), soft=True)
+    session.change(name, with_values(material, which, pull))
+
+
+def tint(session, name, colour):
+    """Multiply a material's diffuse colour."""
+    material = session.material(name).now
+    session.change(name, material.model_copy(update={"kd": triple(np.multiply(material.kd, colour))}))
 
 
 def write_light(folder, session, lights, seed=0):
@@ -78,11 +96,11 @@ class HandBake:
 
 def new_state(screen, folder, backend=None, **materials):
     """The state on a scene whose store is not there yet, and its bakes."""
-    session = Session.new("small room", CAMERA, {"tray": TRAY, "wall": WALL, **materials}, size=SIZE)
-    bakes = Bakes()
-    return EditState(
-        Subject(session, SCENE, folder, folder / "store", None), screen, LIGHTS, bakes, backend=backend
-    ), bakes
+    edits = MaterialEdits({**SCENE.materials, **materials})
+    begun = Session.new("small room", CAMERA, {"tray": TRAY, "wall": WALL, **materials}, size=SIZE).document
+    session, bakes = Session(ViewSteps(edits, begun)), Bakes()
+    subject = Subject(session, edits, SCENE, folder, folder / "store", None)
+    return EditState(subject, screen, LIGHTS, bakes, backend=backend), bakes
 
 
 def until(state, condition):

@@ -112,7 +112,7 @@ def seen_in_place(state):
         "trouble": state.trouble,
         "selected": state.material,
         "pointed": state.pointed,
-        "edited": {name: sorted(one.curves) for name, one in state.session.document.materials.items()},
+        "edited": {n: one.now != one.start for n, one in state.session.document.materials.items()},
         "merged": state.session.document.merged,
         "noise": state.bounced.noise,
         "samples": state.bounced.samples,

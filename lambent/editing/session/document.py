@@ -1,6 +1,7 @@
-"""The session document: a JSON file with a view and all edits of its materials.
+"""The session document: a JSON file with a view and its materials, as baked and as edited.
 
-Angles are in radians, colours linear Rec.709. File names are absolute or relative to the document's folder.
+File names are absolute or relative to the document's folder. Files of version 1, whose edits were layers of curves, are
+read by `session.version_1`.
 """
 
 from __future__ import annotations
@@ -8,8 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
-from pydantic import BeforeValidator, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from lambent.core.discovery import known
 from lambent.core.errors import UserError, invalid
@@ -17,105 +17,35 @@ from lambent.core.inputs import parse_json, read_bytes
 from lambent.core.strict import Strict
 from lambent.core.surroundings import Axis, Layout
 from lambent.core.views.camera import Camera
-from lambent.editing.curves.operators import Operator, Region
 from lambent.materials.document import Material
-from lambent.materials.factored.curve import END_RAD, KNOTS, Curve, angles_rad
 from lambent.scenes.sky.triangle_lights import FEWEST, MOST
 from lambent.store.consistency import is_usable
 from lambent.store.kept.session import FORMAT as STORES
 from lambent.store.kept.session import session_from
 
-LIMIT_BYTES, VERSION = 256 << 20, 1
-MOST_MATERIALS, MOST_LAYERS, MOST_PARAMETERS = 1000, 4096, 100
+FORMAT: Literal["lambent-edit-session"] = "lambent-edit-session"
+LIMIT_BYTES = 256 << 20
+VERSION: Literal[2] = 2
+MOST_MATERIALS = 1000
 MOST_PIXELS = 1 << 26
-LARGEST = 1e9  # limit for curves and colours: its square still fits float32
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Place = Annotated[str, Field(min_length=1, max_length=4096, pattern=r"^[^\x00]*$")]
-Value = Annotated[float, Field(ge=0, le=LARGEST)]
-Number = Annotated[float, Field(allow_inf_nan=False)]
-
-
-def _spread(value: object) -> object:
-    return (value, value, value) if isinstance(value, int | float) else value
-
-
-RGB = Annotated[tuple[Value, Value, Value], BeforeValidator(_spread)]
-
-
-class OfDocument(Strict):
-    """A material that starts as a material document."""
-
-    kind: Literal["document"] = "document"
-    material: Material
-
-
-class OfModel(Strict):
-    """A material that starts as a model with its parameters."""
-
-    kind: Literal["model"] = "model"
-    model: Name
-    parameters: dict[Name, Number | tuple[Number, Number, Number]] = Field(
-        default_factory=dict, max_length=MOST_PARAMETERS
-    )
-
-
-class OfTable(Strict):
-    """A material that starts as the factors of a measured table, or of a file of factors."""
-
-    kind: Literal["table"] = "table"
-    file: Place
-    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
-
-
-Source = Annotated[OfDocument | OfModel | OfTable, Field(discriminator="kind")]
-
-
-class Drawn(Strict):
-    """A curve drawn freehand: linear between points, constant beyond the outermost."""
-
-    angle_rad: Annotated[tuple[Annotated[float, Field(ge=0, le=END_RAD)], ...], Field(max_length=KNOTS + 1)]
-    values: Annotated[tuple[RGB, ...], Field(max_length=KNOTS + 1)]
-
-    @model_validator(mode="after")
-    def _is_a_function(self) -> Drawn:
-        if not 1 <= len(self.angle_rad) == len(self.values):
-            raise ValueError(f"a drawn curve has one value per angle, not {len(self.values)} for {len(self.angle_rad)}")
-        if np.any(np.diff(self.angle_rad) <= 0):
-            raise ValueError("the angles of a drawn curve increase")
-        return self
-
-    @classmethod
-    def of(cls, curve: Curve) -> Drawn:
-        """All knots of a curve."""
-        return cls(angle_rad=tuple(angles_rad().tolist()), values=tuple(map(tuple, curve.values.tolist())))
-
-    @property
-    def curve(self) -> Curve:
-        return Curve.through(np.array(self.angle_rad), np.array(self.values))
-
-
-class CurveEdit(Strict):
-    """Edits of one curve: an optional freehand curve, then operators in order."""
-
-    drawn: Drawn | None = None
-    layers: Annotated[tuple[Operator, ...], Field(max_length=MOST_LAYERS)] = ()
 
 
 class EditedMaterial(Strict):
-    """A material's source, the edits of its curves by name, and the colours that multiply its terms."""
+    """A material: `start`, which transport is computed for, and `now`, as edited."""
 
-    source: Source
-    curves: dict[Name, CurveEdit] = Field(default_factory=dict, max_length=MOST_PARAMETERS)
-    tints: dict[Name, RGB] = Field(default_factory=dict, max_length=MOST_PARAMETERS)
+    start: Material
+    now: Material
 
 
 class Surroundings(Strict):
     """An image that lights the scene instead of its own environment; fields as in `scenes.ImageEnvironment`."""
 
     file: Place
-    scale: Annotated[float, Field(gt=0, le=LARGEST)] = 1.0
-    rotation_deg: Number = 0.0
+    scale: Annotated[float, Field(gt=0, le=1e9)] = 1.0
+    rotation_deg: Annotated[float, Field(allow_inf_nan=False)] = 0.0
     layout: Layout | None = None
     up: Axis = "+y"
 
@@ -137,8 +67,8 @@ class SessionDocument(Strict):
         Angle in degrees above which edges of the scene's meshes are sharp; None to use the normals of its files.
     """
 
-    format: Literal["lambent-edit-session"] = "lambent-edit-session"
-    version: Literal[1] = 1
+    format: Literal["lambent-edit-session"] = FORMAT
+    version: Literal[2] = VERSION
     scene: Place
     camera: Camera
     size: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] = (512, 512)
@@ -184,15 +114,20 @@ def load_document(path: Path) -> SessionDocument:
 
 def document_from(data: Any, path: Path) -> SessionDocument:
     """The session of a parsed document; errors, which are those of `load_document`, name `path`."""
+    from lambent.editing.session.version_1 import upgraded
+
     if not isinstance(data, dict) or "format" not in data:
         raise UserError("not a session of edits", file=path, expected="an object with a format")
-    if (version := data.get("version", VERSION)) != VERSION:
+    version = data.get("version", VERSION)
+    if version not in (1, VERSION):
         hint = "use the Lambent that wrote it, or a later one"
         raise UserError(
             "unsupported session version", file=path, field="version", got=version, expected=VERSION, hint=hint
         )
+    if version == 1:
+        data = upgraded(data, path)
     try:
         return SessionDocument.model_validate(data)
     except ValidationError as error:
-        kinds = (SessionDocument, Surroundings, EditedMaterial, CurveEdit, Drawn, Operator, Region, OfModel, OfTable)
-        raise invalid(error, path, [field for kind in kinds for field in kind.model_fields]) from error
+        fields = [field for kind in (SessionDocument, Surroundings, EditedMaterial) for field in kind.model_fields]
+        raise invalid(error, path, fields) from error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from lambent.materials.lobes import NUMPY, density_of_slopes, passed
 from lambent.materials.slope_curve import NODES_COSINE, NODES_RHO, ROW, at_cosine, normalised, slope_table
 
 STEEPEST_RAD = 1.57  # beyond, the squared tangent overflows the curve's range
+ONE = Curve.constant()
 SAME = 1e-3  # relative difference up to which channels share a curve
 
 
@@ -108,6 +110,7 @@ def as_kd_curve(curve: Curve, coupled: bool) -> tuple[tuple[float, ...], Floats]
     return one, (size * shape.max() / max(normalised(one))) ** 2
 
 
+@lru_cache(maxsize=128)  # an edit of one lobe keeps the curves of the others
 def lobe_terms(lobe: Lobe, prefix: str = "") -> tuple[tuple[Term, ...], dict[str, Curve]]:
     """Terms and curves of a Kurt lobe; names begin with `prefix`.
 
@@ -142,14 +145,14 @@ def of_material(material: Material) -> Editable:
     if any(material.kd):
         quotient, scale = (CoupledDiffuse(), 1.0) if material.kd_coupled else (One(), 1 / np.pi)
         bent = material.kd_curve
-        curves["diffuse"] = Curve.constant() if bent is None else _over_cosine(normalised(bent))
+        curves["diffuse"] = ONE if bent is None else _over_cosine(normalised(bent))
         scale_r = triple(scale * np.array(material.kd))
         terms.append(Term("diffuse", quotient, scale_r, (Factor("diffuse", "theta_i"),), viewer="diffuse"))
     if any(material.kt_d):
         scale_t = triple(np.array(material.kt_d) / np.pi)
         factor = Factor("diffuse through", "theta_i")
         terms.append(Term("diffuse through", One(), scale_t, (factor,), side="transmission"))
-        curves["diffuse through"] = Curve.constant()
+        curves["diffuse through"] = ONE
     for prefix, lobe in prefixed(material.lobes):
         more, of_lobe = lobe_terms(lobe, prefix)
         terms += more
@@ -157,6 +160,7 @@ def of_material(material: Material) -> Editable:
     return Editable(material.name, tuple(terms), curves)
 
 
+@lru_cache(maxsize=16)
 def _over_cosine(nodes: tuple[float, ...]) -> Curve:
     return Curve.of(lambda x: at_cosine(np.cos(x), nodes, NUMPY))
 

@@ -152,13 +152,13 @@ class KeptView(Strict):
 class EditedView(Strict):
     """A view whose materials are edited in place: a `lambent.editing` session document, of files by the store's folder.
 
-    `room` has the materials of the current state then, which the document started from; `shown` are names of materials
-    that the current state shows as edited.
+    Its materials are those of the current state. A document of version 1 had its own: `room` has those of the current
+    state that it started from, and `shown` names materials that the current state had as edited.
     """
 
     document: dict[str, Any]
-    room: dict[str, Material] = Field(default_factory=dict)
-    shown: tuple[str, ...] = ()
+    room: dict[str, Material] = Field(default={}, exclude_if=lambda one: not one)
+    shown: tuple[str, ...] = Field(default=(), exclude_if=lambda one: not one)
 
 
 class WalkSession(Strict):

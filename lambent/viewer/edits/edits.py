@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from lambent.core.errors import UserError
 from lambent.core.light.light_mix import LightMix, MixTrack
 from lambent.core.plain import Triple, plain_name
+from lambent.editing.session.document import SessionDocument
 from lambent.editing.session.history import History
 from lambent.materials.document import Material
 from lambent.scenes.lamp_edits import LampEdit
@@ -26,6 +28,7 @@ class _State:
     stored: Mapping[str, RoomState] = field(default_factory=dict)
     notes: Mapping[str, Hashable] = field(default_factory=dict)
     tracks: Mapping[str, MixTrack | None] = field(default_factory=dict)  # light along paths that was changed, by path
+    views: Mapping[str, SessionDocument] = field(default_factory=dict)  # edited in place, by camera
 
 
 class MaterialEdits:
@@ -83,6 +86,17 @@ class MaterialEdits:
     def change(self, name: str, material: Material) -> None:
         """Change a material within the present stroke, or begin a stroke."""
         self._go_on(room=self._room(self.room.model_copy(update={"materials": {**self.edited, name: material}})))
+
+    @property
+    def views(self) -> Mapping[str, SessionDocument]:
+        """Views edited in place, by their camera's name; their materials are those of the room."""
+        return self._history.now.views
+
+    def change_view(self, view: SessionDocument) -> None:
+        """Change a view, and the room's materials to those of the view, within the present stroke, or begin one."""
+        now = {name: one.now for name, one in view.materials.items()}
+        room = self._room(self.room.model_copy(update={"materials": {**self.edited, **now}}))
+        self._go_on(room=room, views={**self.views, view.camera.name: view})
 
     def mix(self, light: LightMix) -> None:
         """Change the light mix within the present stroke, or begin a stroke."""
@@ -172,9 +186,9 @@ class MaterialEdits:
     def end_stroke(self) -> None:
         self._history.end_stroke()
 
-    def begin_from(self, session: WalkSession) -> None:
-        """Start a new history from a saved session; earlier steps cannot be undone."""
-        self._history = History(replace(self._state_of(session), tracks=self.tracks))
+    def begin_from(self, session: WalkSession, views: Mapping[str, SessionDocument] = MappingProxyType({})) -> None:
+        """Start a new history from a saved session, with its views; earlier steps cannot be undone."""
+        self._history = History(replace(self._state_of(session), tracks=self.tracks, views=views))
 
     @property
     def history(self) -> History[_State]:
@@ -184,12 +198,14 @@ class MaterialEdits:
     def resume(self, history: History[_State]) -> None:
         """Go on with the steps of earlier edits, to the present state, as one more stroke if it differs."""
         now, self._history = self._history.now, history
-        self._history.change(replace(now, notes=history.now.notes, tracks=history.now.tracks))
+        kept = history.now
+        self._history.change(replace(now, notes=kept.notes, tracks=kept.tracks, views=kept.views))
 
     def go_to(self, session: WalkSession) -> None:
         """Take a whole session, as one stroke."""
         self.end_stroke()
-        self._history.change(replace(self._state_of(session), notes=self._history.now.notes, tracks=self.tracks))
+        now = self._history.now
+        self._history.change(replace(self._state_of(session), notes=now.notes, tracks=self.tracks, views=now.views))
 
     def _state_of(self, session: WalkSession) -> _State:
         return _State(self._room(session.now), session.beside, session.states)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from lambent.core.errors import UserError
 from lambent.viewer.mode import Mode, check_there
 from lambent.viewer.screen import Screen
 
@@ -23,31 +22,17 @@ def edits(path: Path) -> bool:
     return kind_of(path) is not None
 
 
-def start(
-    path: Path, name: str, screen: Screen, *, device: Any = None, fitting: tuple[int, int] | None = None, **options: Any
-) -> Mode:
-    """Start the mode on a scene, a store or a session; options as in `subject.opened`.
-
-    `fitting` is a size whose aspect a view gets that has no edits yet; by default that of the option `picture`.
-    """
+def start(path: Path, name: str, screen: Screen, *, device: Any = None, **options: Any) -> Mode:
+    """Start the mode on a scene, a store or a session; options as in `subject.opened`."""
     from lambent.realtime.gpu.device import choose_adapter, open_device
     from lambent.viewer.modes.edit.drawing import EditDrawing
-    from lambent.viewer.modes.edit.in_place import InPlace
     from lambent.viewer.modes.edit.mode import EditMode
     from lambent.viewer.modes.edit.shown import backend_of
     from lambent.viewer.modes.edit.state import EditState
-    from lambent.viewer.modes.edit.subject import kind_of, of_aspect, opened
+    from lambent.viewer.modes.edit.subject import opened
 
-    keeper = InPlace(path, screen) if kind_of(path) == "store" else None
-    if keeper is not None and fitting is not None and options.get("camera") not in keeper.opened.edited:
-        options["picture"] = of_aspect(*fitting)
-    try:
-        subject = opened(path, screen.folder, keeper=keeper, **options)
-    except UserError:
-        if keeper is not None:
-            keeper.close()
-        raise
+    subject = opened(path, screen, **options)
     if device is None:  # which serves the whole room, too
         device = open_device({name: choose_adapter().limits[name] for name in OF_ROOM})
-    state = EditState(subject, screen, backend=backend_of(device), keeper=keeper)
+    state = EditState(subject, screen, backend=backend_of(device))
     return EditMode(state, EditDrawing(device, state))

@@ -166,7 +166,7 @@ class Bounced:
         """Measure the costs of the choice; without a choice, propose one that includes all edited materials."""
         self._stop_proposing()
         materials = session.document.materials
-        changed = {name for name, one in materials.items() if one.curves or one.tints}
+        changed = {name for name, one in materials.items() if one.now != one.start}
         kept = changed if self.fixed is None else materials.keys() - self.fixed
         self._asked = self.bounces
         self._proposing = self._bake(session, folder, bounces=self._asked, proposing=kept)

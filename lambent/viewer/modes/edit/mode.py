@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -12,13 +11,13 @@ from lambent.core.light.photometry import LUMINANCE
 from lambent.viewer.background.lost import rescued
 from lambent.viewer.background.work import POLL_S
 from lambent.viewer.cameras.navigation import Navigation
-from lambent.viewer.edits.edits import MaterialEdits
 from lambent.viewer.input import Input
 from lambent.viewer.mode import Drawing, Mode, Panel, Textures
 from lambent.viewer.modes.edit import panels
 from lambent.viewer.modes.edit.bounced_panel import draw_interreflections
 from lambent.viewer.modes.edit.state import OUTLINED_S, EditState
 from lambent.viewer.panels import overlay
+from lambent.viewer.panels.curves import CurvesPanel
 from lambent.viewer.panels.widgets import rows, shadowed
 from lambent.viewer.screen import least
 
@@ -40,21 +39,11 @@ class EditInput(Input):
     def __init__(self, state: EditState) -> None:
         bounds: Any = tuple(map(tuple, state.subject.scene.bounds))
         camera = state.session.document.camera
-        super().__init__(state.screen, Navigation(camera, bounds, "walk"), MaterialEdits({}))
+        super().__init__(state.screen, Navigation(camera, bounds, "walk"), state.subject.edits)
         self._state = state
 
     def dragged(self, dx: float, dy: float) -> None:
         """Ignore drags: the camera is fixed."""
-
-    def keys(self, key: str, event: Mapping[str, Any], ui_has_keys: bool) -> None:
-        """Handle undo and redo of the session."""
-        pressed = event["event_type"] == "key_down" and not ui_has_keys
-        held = "Control" in event["modifiers"] or "Meta" in event["modifiers"]
-        if pressed and held and key in ("z", "y"):
-            back = key == "z" and "Shift" not in event["modifiers"]
-            (self._state.session.undo if back else self._state.session.redo)()
-        else:
-            super().keys(key, event, ui_has_keys)
 
     def pointed(self, at: tuple[float, float] | None) -> None:
         view = self._state.loading.view
@@ -80,8 +69,8 @@ class EditMode(Mode):
     def __init__(self, state: EditState, drawing: Drawing) -> None:
         super().__init__(state.subject.name, state.screen, EditInput(state), drawing, columns(state))
         self.state = state
-        if state.files.keeper is not None:
-            self.head = partial(panels.draw_head, state, state.files.keeper)
+        if state.subject.keeper is not None:
+            self.head = partial(panels.draw_head, state, state.subject.keeper)
 
     @property
     def moving(self) -> bool:
@@ -108,6 +97,8 @@ class EditMode(Mode):
         if state.scale is not None:
             overlay.scale_bar_of(place, state.scale, LUMINANCE.unit)
         overlay.draw(self.screen, self._lines())
+        if not imgui.is_any_item_active():
+            state.subject.edits.end_stroke()
 
     def _lines(self) -> list[str]:
         """Lines on background work and its errors."""
@@ -147,13 +138,16 @@ class EditMode(Mode):
 
 def columns(state: EditState) -> tuple[Panel, ...]:
     """Panels of the column."""
+    curves = CurvesPanel(lambda: state.selected, state.subject.edits, state.change, state.screen.say)
     return (
         Panel(
             "Material",
-            partial(panels.draw_material, state, panels.Curves(state)),
-            "the selected material and its curves",
+            partial(panels.draw_material, state),
+            "the selected material",
             opened=True,
         ),
+        Panel("Curves", curves.draw, "pull the curves of the material", opened=True),
+        Panel("Numbers", panels.Numbers(state).draw, "every parameter of the material"),
         Panel("View", partial(panels.draw_look, state), "exposure and view transform", opened=True),
         Panel(
             "Compare", partial(panels.draw_compare, state), "the picture compared with an earlier state", opened=True
@@ -161,7 +155,7 @@ def columns(state: EditState) -> tuple[Panel, ...]:
         Panel(
             "Save",
             partial(panels.draw_files, state),
-            "save the session, or export the material as a document",
+            "save the session, or the material as a document",
             opened=True,
         ),
         Panel(

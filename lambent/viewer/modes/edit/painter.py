@@ -165,11 +165,6 @@ class Painter:
         self._picture.give(light, {name: self._in_picture.get(name, part.start) for name, part in light.parts.items()})
         self._compared = None
 
-    def activate(self, material: str, curve: str) -> None:
-        """Fold the curves that are not dragged into the transport, before the first movement of a drag."""
-        if material in self._in_picture:
-            self._picture.activate(material, curve)
-
     def _work(self) -> None:
         try:
             while self._turn():

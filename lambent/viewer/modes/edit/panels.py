@@ -6,10 +6,10 @@ from functools import partial
 
 from imgui_bundle import imgui
 
-from lambent.viewer.modes.edit.curves.editor import CurveEditor
-from lambent.viewer.modes.edit.in_place import InPlace
+from lambent.viewer.edits.keeping import SessionKeeper
 from lambent.viewer.modes.edit.state import OFF, EditState
 from lambent.viewer.panels import look as looks
+from lambent.viewer.panels import parameters
 from lambent.viewer.panels.widgets import (
     AMBER,
     DIM,
@@ -27,11 +27,12 @@ HISTORY = ("undo", "redo")
 LEAST_CHOICE_PX = 80.0
 
 
-def draw_head(state: EditState, keeper: InPlace) -> None:
+def draw_head(state: EditState, keeper: SessionKeeper) -> None:
     """Draw the way back to the room, and lines on the store's session, where it is not kept or not taken over whole."""
-    meaning = "walks through the room from here; 'to the room' below lets it show a material as edited"
+    meaning = "walks through the room from here, with its materials as edited"
     buttons([("walk from here", keeper.keeps and not state.files.busy, state.enter_room, meaning)])
-    wrapped([line for line in (keeper.fault, *keeper.lines) if line], AMBER)
+    lines = dict.fromkeys(line for line in (keeper.fault, *state.subject.lines) if line)
+    wrapped(list(lines), AMBER)
 
 
 def draw_scene(state: EditState) -> None:
@@ -63,8 +64,8 @@ def draw_scene(state: EditState) -> None:
         state.files.open(text, state.material)
 
 
-def draw_material(state: EditState, curves: Curves) -> None:
-    """Draw the selected material, its source, and its curves."""
+def draw_material(state: EditState) -> None:
+    """Draw the selected material in plain words, undo and redo."""
     names = state.materials
     if not names:
         return
@@ -83,10 +84,23 @@ def draw_material(state: EditState, curves: Curves) -> None:
         (HISTORY[0], history.can_undo, session.undo, "undoes the last step (Ctrl+Z)"),
         (HISTORY[1], history.can_redo, session.redo, "redoes the step (Ctrl+Shift+Z)"),
     ])  # fmt: skip
-    fixed = state.session.original(chosen).fixed
-    if fixed:
-        coloured(f"cannot be edited: {', '.join(fixed)}", DIM)
-    curves.draw(chosen)
+    edits = state.subject.edits
+    state.change(chosen, parameters.in_words(edits.current(chosen), edits.scene[chosen]))
+    buttons(
+        [("reset material", chosen in edits.edited, partial(edits.reset, chosen), "restores the material as baked")]
+    )
+
+
+class Numbers:
+    """Every parameter of the selected material."""
+
+    def __init__(self, state: EditState) -> None:
+        self._state, self._linked = state, True
+
+    def draw(self) -> None:
+        if (name := self._state.selected) is not None:
+            material, self._linked = parameters.edited(self._state.subject.edits.current(name), self._linked)
+            self._state.change(name, material)
 
 
 def draw_compare(state: EditState) -> None:
@@ -132,46 +146,15 @@ def draw_look(state: EditState) -> None:
 
 
 def draw_files(state: EditState) -> None:
-    """Draw saving of the session and export of the material."""
-    files, keeper = state.files, state.files.keeper
-    kept = "to the room", not files.busy and bool(state.material), lambda: files.export(state.material, into_room=True)
+    """Draw saving of the session and of the material."""
+    files, keeper, chosen = state.files, state.files.keeper, bool(state.material)
     saved = "save session", True, files.save, "saves the session (Ctrl+S); never overwrites another session's file"
+    export = partial(files.export, state.material)
     buttons([
-        saved if keeper is None or not keeper.keeps else
-        (*kept, "lets the walk and stills show the material as edited, with fitted lobes where needed"),
-        ("export", not files.busy and bool(state.material), lambda: files.export(state.material),
-         "saves the edited material as a document for all other commands, with fitted lobes where needed"),
+        *([] if keeper is not None and keeper.keeps else [saved]),
+        ("save material", chosen, export, "saves the edited material as a document for all other commands"),
     ])  # fmt: skip
     if files.home is not None:
         coloured(files.home.name + (" (changed)" if files.unsaved else ""), DIM)
     if files.busy:
         coloured(files.doing, DIM)
-    if (found := files.exported) is not None:
-        shares = [(f"error, {name}", f"{share:.2%}") for name, share in found.shares.items()]
-        fitted = ", ".join(found.fitted) or "none: exact"
-        to = "the room" if files.exported_to is None else files.exported_to.name
-        rows([("to", to), ("fitted", fitted), ("verdict", str(found.verdict)), *shares], "exported")
-        wrapped(found.warnings, AMBER)
-
-
-class Curves:
-    """The curve editor, and the material that it drags."""
-
-    def __init__(self, state: EditState) -> None:
-        self._state = state
-        self._active: str | None = None
-        self._needed: frozenset[str] = frozenset()
-        self._editor = CurveEditor()
-
-    def draw(self, material: str) -> None:
-        """Draw the curves of a material; a grabbed curve becomes active in the picture."""
-        state, editor = self._state, self._editor
-        editor.draw(state.session, material)
-        if editor.state.active_curve != self._active:
-            self._active = editor.state.active_curve
-            if self._active is not None:
-                state.painter.run(partial(state.painter.activate, material, self._active))
-        needed = state.painter.frame.needed if state.painter.frame is not None else frozenset()
-        for name in self._needed - needed:
-            editor.state.transported(state.session, name)
-        self._needed = needed

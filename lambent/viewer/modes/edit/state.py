@@ -13,6 +13,7 @@ from lambent.core.light.exposure import metered
 from lambent.core.light.false_colour import Range, SignedRange
 from lambent.core.light.photometry import photometric
 from lambent.editing.session.document import SessionDocument
+from lambent.materials.document import Material
 from lambent.materials.factored.terms import Editable
 from lambent.store.source import changed_inputs
 from lambent.store.store import MANIFEST, Store
@@ -21,7 +22,7 @@ from lambent.viewer.look import Look
 from lambent.viewer.mode import Divider
 from lambent.viewer.modes.edit.baking import LIGHTS, Baking
 from lambent.viewer.modes.edit.files import Files
-from lambent.viewer.modes.edit.in_place import InPlace
+from lambent.viewer.modes.edit.in_place import RoomsView
 from lambent.viewer.modes.edit.interreflections import SHOWN, Bounced
 from lambent.viewer.modes.edit.loading import Loading, ViewMap
 from lambent.viewer.modes.edit.painter import Frame, Materials, Painter, Wish, checked
@@ -77,7 +78,6 @@ class EditState:
         lights: Sequence[int] = LIGHTS,
         bake: Callable[..., Baking] = Baking,
         backend: Backend | None = None,
-        keeper: InPlace | None = None,
     ) -> None:
         self.subject, self.session, self.screen, self.lights = subject, subject.session, screen, tuple(lights)
         self.look = Look(exposure_ev=subject.scene.exposure_ev or 0.0, shows=("full",))
@@ -90,12 +90,12 @@ class EditState:
         self.painter = Painter(self.session.document.size[::-1], backend=backend)
         self.loading = Loading(self.painter, subject.store)
         self.baking: Baking | None = None
-        self.files = Files(self.session, screen, subject.name, subject.home, keeper)
-        if keeper is not None:
-            keeper.begin(self.session, self.look)
-            self._metered = self._metered or keeper.has_exposure
-            selected = None if keeper.opened.view is None else keeper.opened.view.selected
-            of = (o.material for o in subject.scene.objects if o.name == selected)
+        self.files = Files(subject, screen)
+        self.room: RoomsView | None = None
+        if subject.keeper is not None:
+            self.room = RoomsView(subject.keeper, self.look)
+            self._metered = self._metered or self.room.has_exposure
+            of = (o.material for o in subject.scene.objects if o.name == self.room.selected)
             self.material = next((name for name in of if name in self.session.document.materials), self.material)
         self._bake = bake
         self.bounced = Bounced(self.painter, bake)
@@ -138,6 +138,11 @@ class EditState:
         return view.materials if view is not None and view.materials else tuple(self.session.document.materials)
 
     @property
+    def selected(self) -> str | None:
+        """The material to edit, if it has not been merged with another."""
+        return self.material if self.material in self.session.document.materials else None
+
+    @property
     def outlined(self) -> tuple[str, ...]:
         """Outlined objects: the one under the mouse and, for a moment, the objects of a new selection."""
         view = self.loading.view
@@ -153,6 +158,13 @@ class EditState:
         """Edit this material."""
         self.material, self.selected_s = material, self.screen.clock()
 
+    def change(self, name: str, material: Material) -> None:
+        """Change a material within the present stroke, or begin one."""
+        if material != self.subject.edits.current(name):
+            if not self.subject.edits.in_stroke:
+                self.session.history.begin_stroke()
+            self.session.change(name, material)
+
     def select_next(self) -> None:
         """Select the next material in view."""
         names = self.materials
@@ -166,20 +178,19 @@ class EditState:
         self.loading.poll()
         self._take_edits()
         self._take_baked()
-        if not self.loading.busy:
+        if not (self.loading.busy or self.subject.edits.in_stroke):  # a drag needs transport where it ends
             self._have_transport()
         direct = bool(self.loading.lights) and self.baking is None and not self.loading.busy
         self.bounced.tick(self.session, self.loading.folder, direct)
 
     def enter_room(self) -> None:
-        """Go to the room, at the camera of this view; say which materials it shows otherwise than as edited."""
-        if (keeper := self.files.keeper) is not None:
-            if keeper.unshown:
-                self.screen.say(f"kept in this view, not shown in the room: {', '.join(keeper.unshown)}")
+        """Go to the room, at the camera of this view."""
+        if (room := self.room) is not None:
             names = [o.name for o in self.subject.scene.objects if o.material == self.material]
-            before = None if keeper.opened.view is None else keeper.opened.view.selected
-            keeper.leave(self.session.document.camera, before if before in names else next(iter(names), None))
-            self.screen.enter = partial(exchanged, store=keeper.store, before=EDIT, name=WALK)
+            selected = room.selected if room.selected in names else next(iter(names), None)
+            room.leave(self.session.document.camera, selected)
+            store = self.session.path(self.session.document.scene)
+            self.screen.enter = partial(exchanged, store=store, before=EDIT, name=WALK)
 
     def close(self) -> None:
         """Stop background work; finished work stays in the store."""
@@ -192,11 +203,7 @@ class EditState:
     def _take_edits(self) -> None:
         document, look = self.session.document, self.look
         if document is not self._document:
-            before = self._document.materials if self._document is not None else {}
-            self._now = {
-                name: self._now[name] if before.get(name) is one else self.session.editable(name)
-                for name, one in document.materials.items()
-            }
+            self._now = {name: self.session.editable(name) for name in document.materials}
             self._document = document
             self.material = document.merged.get(self.material, self.material)
         surfaces = SHOWN[self.bounced.shown]
@@ -233,7 +240,7 @@ class EditState:
     def _have_transport(self) -> None:
         """Bake missing transport if a material's source has changed."""
         document = self.session.document
-        sources = (document.environment, document.merged, *(one.source for one in document.materials.values()))
+        sources = (document.environment, document.merged, *(one.start for one in document.materials.values()))
         if len(sources) == len(self._sources) and all(map(operator.is_, sources, self._sources)):
             return
         folder = self.subject.store_for(document.environment)

@@ -13,15 +13,21 @@ from lambent.core.errors import UserError
 from lambent.core.inputs import read_head, sha256_of
 from lambent.core.plain import plain_name, triple
 from lambent.core.views.camera import Camera, overview
-from lambent.editing.session.document import Surroundings
-from lambent.editing.session.session import Session
+from lambent.editing.session.document import SessionDocument, Surroundings
+from lambent.editing.session.session import Session, with_materials
 from lambent.scenes.loaders.load import BUILTIN_PREFIX, is_scene, load_scene
 from lambent.scenes.scene import Scene
+from lambent.store.kept.session import RoomState, WalkSession
 from lambent.store.kept.views import read_views
 from lambent.store.source import SURROUNDINGS, materials_in_views, scene_of
 from lambent.store.store import MANIFEST, Store
-from lambent.viewer.modes.edit.in_place import InPlace
+from lambent.viewer.edits.edits import MaterialEdits
+from lambent.viewer.edits.keeping import SessionKeeper
+from lambent.viewer.edits.session_file import SOON_S
+from lambent.viewer.edits.view_steps import ViewSteps
+from lambent.viewer.modes.edit.in_place import former_view, kept_view
 from lambent.viewer.picture import LARGEST_PX
+from lambent.viewer.screen import Screen
 
 Kind = Literal["scene", "store", "session"]
 SIZE = (512, 512)
@@ -37,7 +43,8 @@ class Subject:
     Attributes
     ----------
     session : Session
-        Session with all materials of the scene's objects.
+        Session with all materials of the scene's objects, in the history of `edits`.
+    edits : MaterialEdits
     scene : Scene
         The scene with its own environment.
     folder : Path
@@ -48,14 +55,19 @@ class Subject:
         The environment at the start; None for the scene's own.
     home : Path or None
         File of the session, if it was opened from one.
+    keeper : SessionKeeper or None
+        Of the store's session, if a store was opened; `lines` are lines on problems with it.
     """
 
     session: Session
+    edits: MaterialEdits
     scene: Scene
     folder: Path
     store: Path
     lit_by: Surroundings | None
     home: Path | None = None
+    keeper: SessionKeeper | None = None
+    lines: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -82,30 +94,31 @@ def kind_of(path: Path) -> Kind | None:
 
 def opened(
     path: Path,
-    folder: Path,
+    screen: Screen,
     *,
     camera: str | None = None,
     environment: Path | None = None,
     picture: tuple[int, int] | None = None,
+    fitting: tuple[int, int] | None = None,
     store: Path | None = None,
     crease_deg: float | None = None,
-    keeper: InPlace | None = None,
+    soon_s: float = SOON_S,
 ) -> Subject:
-    """Open a path.
+    """Open a path. Of a store, the view has the materials of the room, in the store's session.
 
     Parameters
     ----------
     camera, picture
         Name of a camera or saved view, and (width, height) in pixels; by default the session's, else the first camera
-        or an overview, and 512 x 512.
+        or an overview, and 512 x 512 or the aspect of `fitting`.
     environment
         An image that lights the scene instead of its own environment.
     store
-        Folder for transport; by default the opened store itself, or for a scene a new store in `folder`.
+        Folder for transport; by default the opened store itself, or for a scene a new store in the screen's folder.
     crease_deg
         As for `load_scene`; by default the session's.
-    keeper
-        Of a store's session, with the edits of the view and the room's materials; by default the scene's materials.
+    soon_s
+        Of `SessionFile`.
 
     Raises
     ------
@@ -115,60 +128,90 @@ def opened(
     if picture is not None and max(picture) > LARGEST_PX:
         got = f"{picture[0]}x{picture[1]}"
         raise UserError("picture is too large", field="--picture", got=got, expected=f"at most {LARGEST_PX} a side")
+    if environment is not None and not environment.is_file():
+        raise UserError("file does not exist", file=environment, field="--environment")
     kind = kind_of(path)
-    if kind == "session":
-        session = Session.open(path)
+    session = Session.open(path) if kind == "session" else None
+    place = str(path)
+    if session is not None:
         place = str(session.path(session.document.scene))
         place = place if Path(place).exists() else session.document.scene
         crease_deg = session.document.crease_deg if crease_deg is None else crease_deg
-    else:
-        session, place = None, str(path)
     base = Path(place) if Path(place).is_dir() else None
     scene = _scene_at(place, crease_deg)
-    kept = _kept_environment(base)
-    lit_by = Surroundings(file=str(environment.resolve())) if environment is not None else kept
-    if environment is not None and not environment.is_file():
-        raise UserError("file does not exist", file=environment, field="--environment")
-    if keeper is not None:
-        where = camera_named(scene, base, camera)
-        session = keeper.view(where, scene.materials, folder / plain_name(scene.name, "scene"))
-    if session is None:
-        where = camera_named(scene, base, camera)
-        merged = _merged_in(base, scene)
-        names = {o.material: scene.materials[o.material] for o in scene.merged(merged).objects}
-        materials = {name: keeper.material(name, one) if keeper else one for name, one in names.items()}
-        begun = Session.new(_lasting(place), where, materials, size=picture or SIZE, environment=lit_by)
-        kept_too = {"merged": merged, "crease_deg": crease_deg}
-        session = Session(begun.document.model_copy(update=kept_too))
-    else:
-        changes = {**_changes(session, scene, base, camera, picture), "crease_deg": crease_deg}
-        if environment is not None:
-            changes["environment"] = lit_by
-        session = Session(session.document.model_copy(update=changes), session.folder)
-        lit_by = session.document.environment
-    own = base if base is not None and lit_by == kept else None
-    chosen = store or own or default_store(folder, scene.name, lit_by, session.folder)
-    check_store(chosen, place)
-    return Subject(session, scene, folder, chosen, lit_by, path if kind == "session" else None)
+    edits = MaterialEdits(scene.materials)
+    keeper = SessionKeeper(edits, base, screen, soon_s) if kind == "store" else None
+    try:
+        lines = [] if keeper is None else list(keeper.open(None))
+        kept = _kept_environment(base)
+        lit_by = Surroundings(file=str(environment.resolve())) if environment is not None else kept
+        document, folder = (None, Path()) if session is None else (session.document, session.folder)
+        if keeper is not None and base is not None:
+            where, folder = camera_named(scene, base, camera), base
+            document, more = _of_room(keeper, where, base, edits, screen.folder / plain_name(scene.name, "scene"))
+            lines += more
+        changes: dict[str, object] = {"crease_deg": crease_deg}
+        if document is None:
+            begun = with_materials(_begun(place, scene, base, camera_named(scene, base, camera)), edits.edited)
+            size = picture or of_aspect(*(fitting or SIZE))
+            document = begun.model_copy(update={"size": size, "environment": lit_by})
+        else:
+            changes |= _changes(document, scene, base, camera, picture)
+            changes |= {} if environment is None else {"environment": lit_by}
+        document = document.model_copy(update=changes)
+        if keeper is None:
+            edits.begin_from(WalkSession(now=RoomState(materials={n: m.now for n, m in document.materials.items()})))
+        lit_by = document.environment
+        own = base if base is not None and lit_by == kept else None
+        chosen = store or own or default_store(screen.folder, scene.name, lit_by, folder)
+        check_store(chosen, place)
+    except UserError:
+        if keeper is not None:
+            keeper.close()
+        raise
+    now = Session(ViewSteps(edits, document), folder)
+    home = path if kind == "session" else None
+    return Subject(now, edits, scene, screen.folder, chosen, lit_by, home, keeper, tuple(lines))
+
+
+def _of_room(
+    keeper: SessionKeeper, camera: Camera, base: Path, edits: MaterialEdits, like: Path
+) -> tuple[SessionDocument | None, list[str]]:
+    """The view of a store's session, or else once of a former file, and lines on what it does not show as the room."""
+    now = keeper.opened.now
+    parts = {"light mix": now.light.groups, "lamps": now.lamps, "textures": now.textures}
+    other = [what for what, changed in parts.items() if changed]
+    lines = [f"shown as baked here: the room's {', '.join(other)}"] if other else []
+    if (found := kept_view(keeper.opened, camera, base, edits)) is not None:
+        return found, lines
+    found, more = former_view(camera, base, like)
+    return found, lines + more
+
+
+def _begun(place: str, scene: Scene, base: Path | None, camera: Camera) -> SessionDocument:
+    """A view without edits."""
+    merged = _merged_in(base, scene)
+    used = {o.material: scene.materials[o.material] for o in scene.merged(merged).objects}
+    return Session.new(_lasting(place), camera, used).document.model_copy(update={"merged": merged})
 
 
 def _changes(
-    session: Session, scene: Scene, base: Path | None, camera: str | None, picture: tuple[int, int] | None
+    document: SessionDocument, scene: Scene, base: Path | None, camera: str | None, picture: tuple[int, int] | None
 ) -> dict[str, object]:
-    """Changes to a saved session for another view, and the scene's materials that the session does not edit."""
+    """Changes to a saved view for another camera or size, and the scene's materials that it does not have."""
     changes: dict[str, object] = {}
     if camera is not None:
         changes["camera"] = camera_named(scene, base, camera)
     if picture is not None:
         changes["size"] = picture
-    for name in (*session.document.merged, *session.document.merged.values()):
+    for name in (*document.merged, *document.merged.values()):
         known("material", name, scene.materials, field="merged")
-    used = {o.material: scene.materials[o.material] for o in scene.merged(session.document.merged).objects}
-    for name in session.document.materials:
+    used = {o.material: scene.materials[o.material] for o in scene.merged(document.merged).objects}
+    for name in document.materials:
         known("material", name, used, field="materials")
-    rest = {name: material for name, material in used.items() if name not in session.document.materials}
-    found = Session.new(session.document.scene, session.document.camera, rest)
-    return {**changes, "materials": {**session.document.materials, **found.document.materials}}
+    rest = {name: material for name, material in used.items() if name not in document.materials}
+    found = Session.new(document.scene, document.camera, rest)
+    return {**changes, "materials": {**document.materials, **found.document.materials}}
 
 
 def of_aspect(width: int, height: int) -> tuple[int, int]:

@@ -20,7 +20,6 @@ from pathlib import Path
 from lambent.bake.interreflection.settings import Bounces
 from lambent.core.errors import UserError
 from lambent.editing.interreflection.noise import PASS, PassNoise
-from lambent.editing.session.document import EditedMaterial, OfDocument
 from lambent.editing.session.session import Session
 from lambent.scenes.scene import Scene
 from lambent.store.source import SURROUNDINGS
@@ -84,7 +83,7 @@ def bounce(session: Path, folder: Path, bounces: Bounces, kept: Collection[str] 
 def _own(session: Session, scene: Scene) -> set[str]:
     """Materials that differ from the scene's."""
     materials = session.document.materials.items()
-    return {name for name, one in materials if one != EditedMaterial(source=OfDocument(material=scene.materials[name]))}
+    return {name for name, one in materials if one.now != scene.materials[name]}
 
 
 def _note_environment(store: Store, session: Session) -> None:

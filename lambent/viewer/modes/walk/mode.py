@@ -46,12 +46,13 @@ from lambent.viewer.modes.walk.panels import (
     states,
     view,
 )
-from lambent.viewer.modes.walk.panels.curves import CurvesPanel
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.session.finishes import Finishes
 from lambent.viewer.modes.walk.session.kept_view import restore
+from lambent.viewer.modes.walk.session.leaving import edit_view
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.panels import card, overlay, statistics
+from lambent.viewer.panels.curves import CurvesPanel
 from lambent.viewer.panels.plots import side_plots
 from lambent.viewer.panels.widgets import rows
 from lambent.viewer.screen import Screen, least
@@ -202,10 +203,13 @@ class WalkMode(Mode):
 def panels(state: WalkState, falling: FallingLight | None, finishes: Finishes) -> tuple[Panel, ...]:
     """Panels of the column, sorted into the sizes of the window."""
     light_on_it = partial(metering.draw_falling, falling, state)
+    edits = state.materials.edits
+    edit, can_edit = partial(edit_view, state), lambda: state.session.keeps and state.rebaking.possible
+    curves = CurvesPanel(lambda: state.selection.material, edits, edits.change, state.screen.say, edit, can_edit)
     of_lamps = SizedPanel("Lamps", partial(lamps.draw, state.lamps), "move, aim and exchange a lamp of the scene")
     return (
         SizedPanel("Material", partial(material.draw, state, finishes), "the selected object, its material", True),
-        SizedPanel("Curves", CurvesPanel(state).draw, "pull the curves of the selected material"),
+        SizedPanel("Curves", curves.draw, "pull the curves of the selected material"),
         SizedPanel("Light on it", light_on_it, "illuminance on the selected object, by group", True, ("design",)),
         SizedPanel("Light", partial(lights.draw, state), "each group of lamps: on or off, brightness, colour"),
         *([of_lamps] if state.lamps.records else []),

@@ -14,6 +14,7 @@ from lambent.viewer.cameras.navigation import Movement, Navigation
 from lambent.viewer.editor.editor import Editor
 from lambent.viewer.editor.files import with_account, write_document
 from lambent.viewer.edits.edits import MaterialEdits, rescue
+from lambent.viewer.edits.keeping import SessionKeeper
 from lambent.viewer.look import Look
 from lambent.viewer.mode import Divider
 from lambent.viewer.modes.walk.comparison import Comparison
@@ -24,7 +25,6 @@ from lambent.viewer.modes.walk.light.lights import Lights
 from lambent.viewer.modes.walk.light.metering import Meter
 from lambent.viewer.modes.walk.markers import Marks
 from lambent.viewer.modes.walk.rebake.rebaked import Rebaking
-from lambent.viewer.modes.walk.session.keeping import SessionKeeper
 from lambent.viewer.modes.walk.session.states import States
 from lambent.viewer.modes.walk.session.texturing import Texturing
 from lambent.viewer.modes.walk.views.filming import Films

@@ -8,7 +8,6 @@ import pytest
 import wgpu
 
 from lambent.core.light.false_colour import Range
-from lambent.editing.curves.operators import Region
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.of_lobes import of_material
 from lambent.realtime.gpu.device import AdapterInfo
@@ -21,7 +20,7 @@ from lambent.viewer.modes.edit.shown import OnGpu, OnHost, backend_of
 from lambent.viewer.screen import Rect
 from tests.editing.test_frozen_pictures import DIFFUSE, SIZE, START, dark_parts, expected, light
 from tests.viewer import waiting
-from tests.viewer.edited_view import LIGHTS, new_state, settled, until
+from tests.viewer.edited_view import LIGHTS, new_state, pull, settled, tint, until
 
 VIEWS = ("filmic", "neutral", "linear", "false-colour")
 
@@ -69,11 +68,11 @@ def test_the_window_shows_the_same_from_the_cores_and_from_the_gpu(device, opene
     """Drags, a switched curve, colours, an undo and a comparison, in every view transform."""
     states = [opened(OnHost(device)), opened(OnGpu(device))]
     for state in states:
-        state.session.pull("tray", "highlight", Region(a=-0.1, b=0.0, c=0.2, d=0.6), y=1.5)
+        pull(state.session, "tray")
         settled(state)
         state.compared.keep(state.now)
-        state.session.pull("tray", "fresnel", Region(a=0.2, b=0.5, c=0.8, d=1.2), y=0.5)
-        state.session.tint("wall", "diffuse", (0.2, 0.9, 0.5))
+        pull(state.session, "tray", "fresnel")
+        tint(state.session, "wall", (0.2, 0.9, 0.5))
         state.look.exposure_ev, state.look.scale = -1.0, Range(0.1, 1000.0)
     for view in VIEWS:
         for state in states:
@@ -113,7 +112,7 @@ def test_more_lights_fade_in_on_the_gpu_too(device, opened, monkeypatch):
 def test_without_room_on_the_gpu_the_cores_go_on_with_all_edits(device, opened, monkeypatch):
     state, host = opened(OnGpu(device)), opened(OnHost(device))
     for one in (state, host):
-        one.session.pull("tray", "highlight", Region(a=-0.1, b=0.0, c=0.2, d=0.6), y=1.5)
+        pull(one.session, "tray")
     settled(state)
 
     def full(*, size, usage):
@@ -124,7 +123,7 @@ def test_without_room_on_the_gpu_the_cores_go_on_with_all_edits(device, opened, 
         settled(one)
         part = one.painter._parts["wall"][0]
         one.painter.run(lambda one=one, part=part: one.painter.put("wall", part))
-        one.session.tint("wall", "diffuse", (0.2, 0.9, 0.5))
+        tint(one.session, "wall", (0.2, 0.9, 0.5))
     assert np.allclose(settled(state).radiance, settled(host).radiance, rtol=2e-3, atol=1e-4)
     assert "no room" in state.painter.notice and not host.painter.notice
     assert isinstance(state.painter._backend, OnHost)

@@ -17,6 +17,7 @@ from lambent.editing.session.session import Session
 from lambent.materials.document import Material
 from lambent.viewer.modes.edit import interreflections
 from lambent.viewer.modes.edit.interreflections import Bounced
+from tests.viewer.edited_view import tint
 from tests.viewer.waiting import until
 
 NAMES = [f"material {k}" for k in range(8)]
@@ -114,7 +115,7 @@ def test_the_noise_of_a_finished_store_is_shown_at_once(made):
 
 
 def test_a_proposal_is_there_before_the_bake_and_can_be_changed(made):
-    made.session.tint(NAMES[7], "diffuse", 2.0)
+    tint(made.session, NAMES[7], 1.8)
     made.bounced.start()
     tick(made)
     tick(made)

@@ -11,7 +11,7 @@ from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.edit.mode import EditMode
 from lambent.viewer.modes.edit.state import DIRECT
 from lambent.viewer.screen import Rect
-from tests.viewer.edited_view import LIGHTS, lit_state, until
+from tests.viewer.edited_view import LIGHTS, lit_state, tint, until
 from tests.viewer.panel_driver import PanelDriver
 
 
@@ -33,6 +33,11 @@ def mouse(driver, kind, x, y):
     place = driver.state.screen.picture
     event = {"event_type": kind, "x": place.x + x * place.width, "y": place.y + y * place.height, "button": 1}
     driver.mode.input.handle(event, ui_has_mouse=False, ui_has_keys=False)
+
+
+def is_edited(state):
+    one = state.session.material("tray")
+    return one.now != one.start
 
 
 def test_clicks_select_and_the_name_follows_the_mouse(driver):
@@ -59,11 +64,11 @@ def test_clicks_select_and_the_name_follows_the_mouse(driver):
 
 def test_keys_undo_redo_and_save(driver):
     state = driver.state
-    state.session.tint("tray", "diffuse", 2.0)
+    tint(state.session, "tray", 2.0)
     key(driver, "z", "Control")
-    assert not state.session.document.materials["tray"].tints
+    assert not is_edited(state)
     key(driver, "z", "Control", "Shift")
-    assert state.session.document.materials["tray"].tints
+    assert is_edited(state)
     key(driver, "s", "Control")
     assert state.files.home is not None and state.files.home.exists()
     key(driver, "p")
@@ -72,14 +77,14 @@ def test_keys_undo_redo_and_save(driver):
 
 def test_the_buttons_of_the_column(driver):
     state = driver.state
-    state.session.tint("tray", "diffuse", 2.0)
+    tint(state.session, "tray", 2.0)
     driver.frame()
     driver.click("undo")
-    assert not state.session.document.materials["tray"].tints
+    assert not is_edited(state)
     driver.click("redo")
-    assert state.session.document.materials["tray"].tints
+    assert is_edited(state)
     driver.click("reset material")
-    assert not state.session.document.materials["tray"].tints
+    assert not is_edited(state)
     state.tick()
     driver.click("snapshot")
     assert state.compared.chosen == "snapshot 1"
@@ -87,9 +92,8 @@ def test_the_buttons_of_the_column(driver):
     assert state.pixel_exact
     driver.click("save session")
     assert state.files.home is not None
-    driver.click("export")
-    until(state, lambda: state.files.exported is not None)
-    driver.frame(2)
+    driver.click("save material")
+    assert (state.screen.folder / "tray-001.json").is_file()
 
 
 def test_the_picture_keeps_its_shape(driver):
@@ -167,13 +171,29 @@ def test_the_panel_shows_the_difference_to_a(driver):
     until(state, lambda: state.scale is not None)
 
 
-def test_sliders_are_in_reach_without_scrolling(monkeypatch, screen, tmp_path):
-    """In a window of 1280 x 960 as it opens: the plot, its region, the numbers of a lobe, and exposure."""
+def test_sliders_and_curves_are_in_reach_without_scrolling(monkeypatch, screen, tmp_path):
+    """In a window of 1280 x 960 as it opens."""
     state = lit_state(monkeypatch, screen, tmp_path)
     state.select("tray")
     driver = PanelDriver(monkeypatch, EditMode(state, Drawing(None)), (1280, 960))
     driver.frame(3)
-    bottoms = {label: driver.rects[label][3] for label in ("all##preset", "mx", "my", "alpha", "undo", "exposure")}
+    bottoms = {label: driver.rects[label][3] for label in ("smooth", "roughness", "undo", "exposure")}
     driver.close()
     state.close()
     assert max(bottoms.values()) <= 960
+
+
+def test_a_slider_drag_is_one_step(driver):
+    state = driver.state
+    driver.click("Numbers")
+    driver.frame(2)
+    x0, y0, x1, y1, _ = driver.rects["mx"]
+    driver.move(x0 + 0.3 * (x1 - x0), (y0 + y1) / 2)
+    driver.button(True)
+    for share in (0.4, 0.5, 0.6):
+        driver.move(x0 + share * (x1 - x0), (y0 + y1) / 2)
+    driver.button(False)
+    driver.frame(2)
+    assert is_edited(state)
+    state.session.undo()
+    assert not is_edited(state) and not state.session.history.can_undo

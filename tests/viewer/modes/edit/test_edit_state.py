@@ -14,19 +14,17 @@ from lambent.core.light.colour import shown
 from lambent.core.light.false_colour import Range, false_colour
 from lambent.core.light.photometry import photometric
 from lambent.core.pictures.images import to_bytes
-from lambent.editing.curves.operators import Region
 from lambent.editing.picture import EditedPicture
 from lambent.editing.session.session import Session
 from lambent.editing.stored import parts_of
-from lambent.materials.document import load_material
+from lambent.materials.document import Material, load_material
 from lambent.store.store import Store
 from lambent.viewer.modes.edit import painter
 from lambent.viewer.modes.edit.painter import FADE_S
 from lambent.viewer.modes.edit.state import DIRECT, OFF, UNEDITED
 from lambent.viewer.modes.edit.tone import _half_bits, _table, displayed
-from tests.viewer.edited_view import LIGHTS, OTHER_TRAY, SHOWN, TRAY, new_state, settled, until
-
-LOW = Region(a=-0.2, b=0.0, c=0.3, d=0.9)
+from tests.viewer.edited_view import LIGHTS, OTHER_TRAY, SHOWN, TRAY, WALL, new_state, pull, settled, tint, until
+from tests.viewer.editor.measured_specimens import write_measurement
 
 
 @pytest.fixture
@@ -94,7 +92,7 @@ def test_the_first_lights_can_be_edited_and_more_come_without_a_jump(opened):
     bake.arrive(LIGHTS[0])
     until(state, lambda: state.loading.lights == LIGHTS[0])
     settled(state)
-    state.session.pull("tray", "highlight", LOW, y=1.0)
+    pull(state.session, "tray")
     state.painter._clock = clock = type(state.screen.clock)()
     clock.now_s = time.monotonic() + 100
     before = settled(state).radiance
@@ -110,7 +108,7 @@ def test_the_first_lights_can_be_edited_and_more_come_without_a_jump(opened):
     number = state.painter.frame.number
     until(state, lambda: state.painter.frame.number > number + 3)
     assert np.allclose(state.painter.frame.radiance.reshape(-1, 3), (wanted + before.reshape(-1, 3)) / 2, atol=1e-3)
-    state.session.tint("wall", "diffuse", 3.0)
+    tint(state.session, "wall", 1.9)
     clock.now_s += FADE_S
     assert np.allclose(settled(state).radiance.reshape(-1, 3), exact(state), atol=1e-4)
 
@@ -118,7 +116,7 @@ def test_the_first_lights_can_be_edited_and_more_come_without_a_jump(opened):
 def test_undo_redo_and_every_edit_show(ready):
     state, bakes = ready
     start = settled(state).radiance
-    state.session.pull("tray", "fresnel", LOW, y=0.5)
+    pull(state.session, "tray", "fresnel")
     edited = settled(state)
     assert np.allclose(edited.radiance.reshape(-1, 3), exact(state), atol=1e-4) and not edited.needed
     assert not np.allclose(edited.radiance, start)
@@ -132,12 +130,12 @@ def test_undo_redo_and_every_edit_show(ready):
 def test_another_quotient_is_baked_and_undo_needs_no_bake(ready):
     state, bakes = ready
     before = settled(state).radiance
-    assert not state.session.become("tray", OTHER_TRAY)
+    assert not state.session.change("tray", OTHER_TRAY)
     until(state, lambda: len(bakes.begun) == 2)
     assert any("new transport" in message.text for message in state.screen.messages)
     assert settled(state).needed == {"tray"}
     assert np.allclose(state.painter.frame.radiance, before, atol=1e-4), "shown as before meanwhile"
-    state.session.pull("wall", "diffuse", LOW, y=0.1)
+    pull(state.session, "wall", "diffuse", 1.2)
     meanwhile = settled(state).radiance.reshape(-1, 3)
     assert not np.allclose(meanwhile[SHOWN["wall"]], before.reshape(-1, 3)[SHOWN["wall"]])
     state.session.undo()
@@ -154,7 +152,7 @@ def test_another_quotient_is_baked_and_undo_needs_no_bake(ready):
 
 def test_a_bake_that_nobody_needs_any_more_ends(ready):
     state, bakes = ready
-    state.session.become("tray", OTHER_TRAY)
+    state.session.change("tray", OTHER_TRAY)
     until(state, lambda: len(bakes.begun) == 2)
     state.session.undo()
     until(state, lambda: bakes.begun[1].closed)
@@ -187,18 +185,18 @@ def test_a_is_what_was_opened_or_a_snapshot(ready):
     state, _ = ready
     start = settled(state).radiance
     assert state.painter.frame.compared is None
-    state.session.pull("tray", "highlight", LOW, y=1.0)
+    pull(state.session, "tray")
     state.compared.chosen = UNEDITED
     frame = settled(state)
     assert np.allclose(frame.compared_radiance, start, atol=1e-4)
     assert np.allclose(frame.radiance.reshape(-1, 3), exact(state), atol=1e-4)
     state.compared.keep(state.now)
-    state.session.tint("tray", "diffuse", (3.0, 1.0, 1.0))
+    tint(state.session, "tray", (3.0, 1.0, 1.0))
     again = settled(state)
     assert state.compared.choices == (OFF, DIRECT, UNEDITED, "snapshot 1")
     assert np.allclose(again.compared_radiance, frame.radiance, atol=1e-4)
     assert not np.allclose(again.radiance, frame.radiance)
-    state.session.become("tray", OTHER_TRAY)
+    state.session.change("tray", OTHER_TRAY)
     state.compared.chosen = OFF
     assert settled(state).compared is None
 
@@ -211,8 +209,8 @@ def test_the_difference_to_a_is_in_false_colours_of_a_fitted_scale(ready):
     frame = settled(state)
     assert np.array_equal(frame.compared_radiance, frame.radiance), "nothing else is baked"
     state.compared.chosen, state.compared.scale = UNEDITED, None
-    state.session.tint("tray", "diffuse", (3.0, 0.2, 1.0))
-    state.session.tint("wall", "diffuse", 0.5)
+    tint(state.session, "tray", (3.0, 0.2, 1.0))
+    tint(state.session, "wall", 0.5)
     until(state, lambda: state.compared.scale is not None and settled(state).wish.difference is state.compared.scale)
     frame = state.painter.frame
     above = photometric(frame.radiance - frame.compared_radiance)
@@ -245,16 +243,17 @@ def test_sessions_are_saved_under_names_of_their_own(ready):
     folder = state.screen.folder
     (folder / "small room-001.edits.json").write_text("mine")
     assert not state.files.unsaved
-    state.session.pull("tray", "highlight", LOW, y=1.0)
+    pull(state.session, "tray")
     assert state.files.unsaved
     state.files.save()
     assert (folder / "small room-001.edits.json").read_text() == "mine"
     saved = folder / "small room-002.edits.json"
     assert Session.open(saved).document.materials == state.session.document.materials and not state.files.unsaved
-    state.session.tint("wall", "diffuse", 2.0)
+    tint(state.session, "wall", 2.0)
     rescued = list(state.files.rescue())
     assert [file.name for file in rescued] == ["small room-rescued-001.edits.json"]
-    assert "tints" in json.loads(rescued[0].read_text())["materials"]["wall"]
+    wall = json.loads(rescued[0].read_text())["materials"]["wall"]
+    assert wall["now"]["kd"][0] == 2 * wall["start"]["kd"][0]
     state.files.save()
     assert Session.open(saved).document.materials == state.session.document.materials
     assert not list(state.files.rescue())
@@ -264,21 +263,18 @@ def test_unsaved_materials_are_named_at_the_end(ready, capsys):
     state, _ = ready
     state.files.name_unsaved()
     assert capsys.readouterr().err == ""
-    state.session.tint("wall", "diffuse", 2.0)
+    tint(state.session, "wall", 2.0)
     state.files.name_unsaved()
     assert capsys.readouterr().err == "lambent: note: changes not saved: wall\n"
 
 
-def test_a_material_is_exported_as_a_document(ready):
+def test_a_material_is_saved_as_a_document(ready):
     state, _ = ready
-    state.session.tint("tray", "diffuse", 2.0)
+    tint(state.session, "tray", 2.0)
     state.files.export("tray")
-    with pytest.raises(UserError, match="still fitting tray"):
-        state.files.export("tray")
-    until(state, lambda: state.files.exported is not None)
     written = load_material(state.screen.folder / "tray-001.json")
     assert np.allclose(written.kd, np.multiply(TRAY.kd, 2.0)) and written.lobes == TRAY.lobes
-    assert state.files.exported.fitted == ()
+    assert written.provenance.notes == ("edited by hand",)
 
 
 def test_documents_and_tables_are_dropped(ready, tmp_path):
@@ -293,6 +289,19 @@ def test_documents_and_tables_are_dropped(ready, tmp_path):
     state.files.open(str(tmp_path / "broken.json"), "wall")
     assert sum("not loaded" in message.text for message in state.screen.messages) == 2
     assert len(bakes.begun) == 2
+
+
+def test_a_measured_table_is_fitted_and_its_fit_is_a_step(ready, tmp_path):
+    state, _ = ready
+    table = write_measurement(tmp_path / "paper.astm", Material(kd=(0.6, 0.5, 0.4)))
+    state.files.open(str(table), "wall")
+    with pytest.raises(UserError, match="still fitting"):
+        state.files._fit("wall", table)
+    until(state, lambda: not state.files.busy)
+    assert np.allclose(state.session.material("wall").now.kd, (0.6, 0.5, 0.4), atol=0.02)
+    assert state.session.material("wall").now.provenance.source == "paper.astm"
+    state.session.undo()
+    assert state.session.material("wall").now == WALL
 
 
 def test_an_environment_has_a_store_of_its_own_and_undo_goes_back(ready, tmp_path):
@@ -376,7 +385,7 @@ def test_a_merged_material_is_drawn_and_edited_as_the_other(ready):
     assert state.loading.view.objects == (("plate", "wall"), ("back", "wall")) and state.materials == ("wall",)
     merged = settled(state).radiance.reshape(-1, 3)
     assert np.allclose(merged, exact(state), atol=1e-4)
-    state.session.tint("wall", "diffuse", 2.0)
+    tint(state.session, "wall", 2.0)
     twice = settled(state).radiance.reshape(-1, 3)
     backdrop = state.loading.view.backdrop.reshape(-1, 3)
     for pixels in SHOWN.values():

@@ -68,7 +68,7 @@ def test_curves_are_smoothed_and_put_back(driver, state):
     bumpy = np.abs(np.diff(np.log(values_of(edits.current("brass"), SHAPE)[:, 0]), 2)).max()
     driver.click("smooth")
     assert np.abs(np.diff(np.log(values_of(edits.current("brass"), SHAPE)[:, 0]), 2)).max() < bumpy
-    driver.click("reset")
+    driver.click("reset curve")
     assert edits.current("brass") == edits.scene["brass"]
 
 

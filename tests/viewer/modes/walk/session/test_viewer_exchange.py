@@ -6,8 +6,6 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.light.light_mix import GroupMix, LightMix
-from lambent.editing.curves.operators import Region
-from lambent.editing.session.document import OfDocument
 from lambent.store.kept.session import FILE, read_session
 from lambent.store.kept.views import read_views
 from lambent.viewer.modes.edit import start
@@ -15,8 +13,8 @@ from lambent.viewer.modes.edit.mode import EditMode
 from lambent.viewer.modes.walk.mode import WalkMode, open_store
 from lambent.viewer.modes.walk.session.leaving import edit_view
 from tests.viewer.drawn_frames import drawn
+from tests.viewer.edited_view import pull
 
-LOW = Region(a=-0.2, b=0.0, c=0.3, d=0.9)
 BLUE = (0.1, 0.1, 0.6)
 
 
@@ -56,47 +54,30 @@ def test_there_and_back(mode, baked_box):
     width, height = document.size
     assert width / height == pytest.approx(4 / 3, rel=0.01) and 0.98 < width * height / 512**2 < 1.02
     assert view.state.material == "red" and view.state.look.exposure_ev == -1.0
-    assert document.materials["red"].source.material.kd == BLUE
-    view.state.session.pull("red", "diffuse", LOW, y=-0.5)
+    assert document.materials["red"].now.kd == BLUE
+    pull(view.state.session, "red", "diffuse", 0.5)
+    pulled = view.state.session.material("red").now
     view.state.enter_room()
-    assert "not shown in the room: red" in view.screen.messages[-1].text
     back = enter(mode)
     assert isinstance(back, WalkMode) and back.state.navigation.camera == document.camera
     assert back.state.selection.name == "left" and back.state.look.exposure_ev == -1.0
     drawn(back.drawing, back.state, (32, 24))
     assert back.drawing._a.read().mean() > 0
     edits = back.state.materials.edits
-    assert edits.current("red").kd == BLUE and edits.can_undo
+    assert edits.current("red") == pulled
+    edits.undo()
+    assert edits.current("red").kd == BLUE
     edits.undo()
     assert "red" not in edits.edited, "one history before and after"
+    edits.redo()
     edits.redo()
     edit_view(back.state)
     again = enter(mode)
     assert len(read_views(baked_box).cameras) == 1, "the view is a camera already"
     session = again.state.session
-    assert session.document.materials["red"].curves and session.document.size == (width, height)
+    assert session.material("red").now == pulled and session.document.size == (width, height)
     session.undo()
-    assert not session.document.materials["red"].curves, "the view's history too"
-
-
-def test_what_the_room_shows_of_the_edits_is_a_step_that_can_be_undone(mode, baked_box):
-    edit_view(mode[0].state)
-    view = enter(mode)
-    keeper, session = view.state.files.keeper, view.state.session
-    session.pull("red", "diffuse", LOW, y=-0.5)
-    assert keeper.unshown == ["red"]
-    green = session.document.materials["green"].source.material
-    keeper.show_in_room("red", green)
-    view.state.enter_room()
-    back = enter(mode)
-    edits = back.state.materials.edits
-    assert edits.current("red") == green
-    edits.undo()
-    assert edits.current("red").kd == BLUE
-    edits.redo()
-    edit_view(back.state)
-    again = enter(mode)
-    assert again.state.session.document.materials["red"].curves and again.state.files.keeper.unshown == []
+    assert session.material("red").now.kd == BLUE, "and in the view"
 
 
 def test_a_window_that_began_with_a_view_enters_the_room(adapter, mode, baked_box, screen):
@@ -135,7 +116,7 @@ def test_a_view_says_what_of_the_room_it_does_not_show(mode):
     state = mode[0].state
     state.materials.edits.mix(LightMix({"lamp": GroupMix(intensity=0.5)}))
     edit_view(state)
-    assert enter(mode).state.files.keeper.lines == ["shown as baked here: the room's light mix"]
+    assert enter(mode).state.subject.lines == ("shown as baked here: the room's light mix",)
 
 
 def test_a_view_starts_from_the_scene_where_the_room_is_as_baked(mode):
@@ -143,7 +124,7 @@ def test_a_view_starts_from_the_scene_where_the_room_is_as_baked(mode):
     edit_view(mode[0].state)
     view = enter(mode)
     of_scene = view.state.subject.scene.materials["red"]
-    assert view.state.session.document.materials["red"].source == OfDocument(material=of_scene)
+    assert view.state.session.material("red").now == of_scene
 
 
 @pytest.mark.slow

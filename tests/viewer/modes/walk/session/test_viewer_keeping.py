@@ -22,8 +22,8 @@ from lambent.store.kept.session import (
     write_session,
 )
 from lambent.viewer.edits.edits import MaterialEdits
+from lambent.viewer.edits.keeping import BACK, SessionKeeper
 from lambent.viewer.edits.session_file import ASK_S, CHANGED, READ_ONLY, TAKEN
-from lambent.viewer.modes.walk.session.keeping import BACK, SessionKeeper
 from lambent.viewer.modes.walk.session.kept_view import restore, show_view, view_of
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.screen import Rect, Screen
@@ -179,7 +179,7 @@ def test_fresh_begins_as_baked_and_loses_nothing(window, tmp_path):
 
 
 def test_images_of_sessions_set_aside_stay(window, tmp_path, monkeypatch):
-    monkeypatch.setattr("lambent.viewer.modes.walk.session.keeping.images_of_variants", lambda folder: set())
+    monkeypatch.setattr("lambent.viewer.edits.keeping.images_of_variants", lambda folder: set())
     (tmp_path / "images").mkdir()
     for name in ("bricks-1.png", "tiles-2.png", "gone-3.png"):
         (tmp_path / "images" / name).write_bytes(b"")

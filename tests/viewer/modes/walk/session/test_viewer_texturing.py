@@ -15,7 +15,7 @@ from lambent.store.kept.session import FILE, RoomState, read_session
 from lambent.store.kept.states import variants_of
 from lambent.store.store import Store
 from lambent.viewer.edits.edits import MaterialEdits
-from lambent.viewer.modes.walk.session.keeping import SessionKeeper
+from lambent.viewer.edits.keeping import SessionKeeper
 from lambent.viewer.modes.walk.session.texturing import NONE, OWN, Texturing
 from lambent.viewer.modes.walk.session.thumbnails import SIDE, texture_thumbnail
 from lambent.viewer.screen import Rect, Screen

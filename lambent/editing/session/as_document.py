@@ -1,4 +1,4 @@
-"""Edited materials as material documents: curve lobes, exact where curves still match a document's, or fitted lobes.
+"""Materials with edited curves as documents: curve lobes, exact where curves still match a document's, or fitted lobes.
 
 Lobes are fitted to edited curves as a measured table, as to any measurement. Its tuples lie on a grid of half vectors
 that is fine where the highlight's curves are steep: it resolves a highlight of any width, and any ring drawn by hand.
@@ -6,28 +6,21 @@ that is fine where the highlight's curves are steep: it resolves a highlight of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 
 from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import FLIP_Z, direction
 from lambent.core.plain import triple
-from lambent.editing.session.document import OfDocument, OfModel, OfTable
-from lambent.editing.session.session import Session
-from lambent.materials.document import Lobe, Material, Provenance, Side
-from lambent.materials.export.contract import Verdict, verdict_of
+from lambent.materials.document import Lobe, Material, Provenance
 from lambent.materials.factored.curve import END_RAD, Curve, angles_rad
 from lambent.materials.factored.of_lobes import as_curve_lobe, as_kd_curve, lobe_terms, of_material, prefixed
 from lambent.materials.factored.terms import Editable
 from lambent.materials.fitting.account import evaluate
 from lambent.materials.fitting.fit import fit
-from lambent.materials.measured.inspecting.metrics import errors_and_shares, light_ratios
+from lambent.materials.measured.inspecting.metrics import errors_and_shares
 from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable, TableInfo, collect
-from lambent.materials.models import model_named
-from lambent.materials.models.kurt import Kurt
-from lambent.materials.models.lambert import Lambert
 
 SAME = 1e-9  # relative difference up to which curves count as multiples of each other
 COMPARED = 60_000  # tuples, at most
@@ -39,84 +32,30 @@ RINGS, SECTORS = 96, 24  # of half vectors
 PER_HALF_VECTOR = {"theta_h": 1.0, "slope_t": 1.0, "slope_b": 1.0, "gamma_t": 1.0, "gamma_b": 1.0, "theta_r": 0.5}
 
 
-@dataclass(frozen=True)
-class ExportedMaterial:
-    """An edited material as a document, and the loss of the conversion.
+def as_document(name: str, document: Material | None, start: Editable, edited: Editable) -> Material:
+    """Convert a material with edited curves to a document, whose provenance has the error.
 
-    Attributes
-    ----------
-    material : Material
-        With its provenance.
-    fitted : tuple of str
-        Names of the terms replaced by fitted lobes; empty if the document is exact.
-    errors, shares : dict of float
-        By metric: E between the edited curves and the document, and E relative to the curves' own size.
-    light : dict of float
-        By side: scattered light, document over curves.
-    verdict : Verdict
-        faithful, approximate or unusable, as for exports.
-    warnings : tuple of str
-        Of the fit.
+    Diffuse terms and lobes whose curves are those of the `document` that it started as, or multiples of them, are kept;
+    others become curve lobes where their curves are such. Lobes and a diffuse term are fitted to the sum of the rest.
     """
-
-    material: Material
-    fitted: tuple[str, ...]
-    errors: dict[str, float]
-    shares: dict[str, float]
-    light: dict[Side, float]
-    verdict: Verdict
-    warnings: tuple[str, ...] = ()
-
-
-def export(
-    session: Session,
-    name: str,
-    *,
-    lobes: int | Literal["auto"] = "auto",
-    distribution: Literal["beckmann", "ggx", "best"] = "best",
-) -> ExportedMaterial:
-    """Convert a material of a session, as edited now, to a document.
-
-    Diffuse terms and lobes whose curves are a document's, or multiples of them, are kept. Lobes and a diffuse term are
-    fitted to the sum of the others; `lobes` and `distribution` are as in `fitting.fit`.
-    """
-    edited, start = session.editable(name), session.original(name)
-    document = _document(session.document.materials[name].source)
     kept, rest = (Material(), {term.name for term in edited.terms})
     if document is not None:
         kept, rest = _kept(document, start, edited)
-    warnings: tuple[str, ...] = ()
     if rest:
-        table = EditedTable(part_of(edited, rest), name)
-        samples = table.samples()
+        samples = EditedTable(part_of(edited, rest), name).samples()
         if samples.f.any():
-            found = fit(
-                samples, lobes=lobes, metric=METRIC, distribution=distribution, coupled=kept.kd_coupled,
-                bends_kd=not any(kept.kd),
-            )  # fmt: skip
-            kept, warnings = _sum(kept, found.material), found.warnings
-    fitted = tuple(term.name for term in edited.terms if term.name in rest)
-    samples = EditedTable(edited, name).samples(COMPARED)
-    model = evaluate(kept, samples)
-    errors, shares = errors_and_shares(samples, model)
-    light = light_ratios(samples, model)
-    verdict = verdict_of(shares, light)
-    provenance = _provenance(session, name, fitted, errors, samples, (str(verdict), *warnings))
-    material = kept.model_copy(update={"name": name, "provenance": provenance})
-    return ExportedMaterial(material, fitted, errors, shares, light, verdict, warnings)
-
-
-def _document(source: OfDocument | OfModel | OfTable) -> Material | None:
-    """The document that a material started as; None if it started as curves that no document represents."""
-    if isinstance(source, OfDocument):
-        return source.material
-    if isinstance(source, OfModel):
-        model = model_named(source.model)(**source.parameters)
-        if isinstance(model, Kurt):
-            return Material(lobes=(model.lobe,))
-        if isinstance(model, Lambert):
-            return Material(kd=triple(model.rgb("kd")))
-    return None
+            found = fit(samples, lobes="auto", metric=METRIC, coupled=kept.kd_coupled, bends_kd=not any(kept.kd))
+            kept = _sum(kept, found.material)
+    errors, _ = errors_and_shares(samples := EditedTable(edited, name).samples(COMPARED), evaluate(kept, samples))
+    fitted = [term.name for term in edited.terms if term.name in rest]
+    before = document.provenance or Provenance() if document is not None else Provenance()
+    account = {
+        "method": f"edited curves; lobes fitted to {', '.join(fitted)}" if fitted else "edited curves",
+        "metric": METRIC if fitted else before.metric,
+        "errors": errors,
+        "samples": samples.counts,
+    }
+    return kept.model_copy(update={"name": name, "provenance": before.model_copy(update=account)})
 
 
 def _kept(document: Material, start: Editable, edited: Editable) -> tuple[Material, set[str]]:
@@ -186,42 +125,6 @@ def _sum(one: Material, other: Material) -> Material:
     kd, kt_d = (triple(np.add(getattr(one, name), getattr(other, name))) for name in ("kd", "kt_d"))
     lobes, kd_curve = (*one.lobes, *other.lobes), one.kd_curve if any(one.kd) else other.kd_curve
     return one.model_copy(update={"kd": kd, "kt_d": kt_d, "kd_curve": kd_curve, "lobes": lobes})
-
-
-def _provenance(
-    session: Session,
-    name: str,
-    fitted: tuple[str, ...],
-    errors: dict[str, float],
-    samples: MeasuredSamples,
-    notes: tuple[str, ...],
-) -> Provenance:
-    one = session.document.materials[name]
-    edits = [f"{curve} drawn" if edit.drawn else curve for curve, edit in one.curves.items()]
-    edits += [f"colour of {term}" for term in one.tints]
-    method = "edited: " + (", ".join(edits) or "nothing") + "; "
-    method += f"lobes fitted to {', '.join(fitted)}" if fitted else "exact"
-    before = one.source.material.provenance if isinstance(one.source, OfDocument) else None
-    source, sha256, kind = _origin(one.source)
-    return Provenance(
-        source=before.source if before and before.source else source,
-        source_sha256=before.source_sha256 if before and before.source else sha256,
-        source_format=before.source_format if before and before.source else kind,
-        method=method,
-        metric=METRIC if fitted else None,
-        errors=errors,
-        samples=samples.counts,
-        notes=notes + (tuple(f"before the edits: {note}" for note in before.notes) if before else ()),
-    )
-
-
-def _origin(source: OfDocument | OfModel | OfTable) -> tuple[str, str | None, str]:
-    """Name, hash and format of the source of a material."""
-    if isinstance(source, OfDocument):
-        return source.material.name, None, "material document"
-    if isinstance(source, OfModel):
-        return source.model, None, "model"
-    return source.file.rpartition("/")[2], source.sha256, "measured table"
 
 
 class EditedTable(MeasuredTable):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -22,8 +23,7 @@ from lambent.editing.curves.nodes import (
     with_values,
 )
 from lambent.materials.document import Material
-from lambent.viewer.modes.walk.session.leaving import edit_view
-from lambent.viewer.modes.walk.state import Materials, WalkState
+from lambent.viewer.edits.edits import MaterialEdits
 from lambent.viewer.panels.plots import BLUE, GREEN, MEASURED, MODEL, RED
 from lambent.viewer.panels.widgets import buttons, choice, explain, px
 
@@ -41,9 +41,14 @@ _X, _Y = implot.ImAxis_.x1, implot.ImAxis_.y1
 
 @dataclass
 class CurvesPanel:
-    """The panel's choices, and the node under the mouse."""
+    """The panel's choices, and the node under the mouse; `open_view`, if any, opens the view under exact light."""
 
-    state: WalkState
+    selected: Callable[[], str | None]  # name of the material
+    edits: MaterialEdits
+    change: Callable[[str, Material], None]
+    say: Callable[[str], None]
+    open_view: Callable[[], None] | None = None
+    can_open: Callable[[], bool] = lambda: True
     title: str = ""  # of the curve
     channels: str = "together"
     tool: Tool = "pull"
@@ -51,12 +56,11 @@ class CurvesPanel:
     limits: tuple[float, float] = (0.0, 1.0)  # of the values; fixed while a node is held
 
     def draw(self) -> None:
-        """Draw the panel of the selected object's material."""
-        name, materials = self.state.selection.material, self.state.materials
-        if name is None:
+        """Draw the panel of the selected material."""
+        if (name := self.selected()) is None:
             imgui.text_wrapped("Click an object in the picture.")
             return
-        material = materials.edits.current(name)
+        material = self.edits.current(name)
         found = {_title(material, which): which for which in curves_of(material)}
         if not found:
             imgui.text_wrapped("Black: nothing to pull. Give the material a colour or a lobe first.")
@@ -66,51 +70,34 @@ class CurvesPanel:
         if which.kind == "fresnel":
             self.channels = choice("channels", self.channels, list(CHANNELS), "pulled together, or one of them")
         self.tool = choice("tool", self.tool, TOOLS, "one node, with its neighbours, or along the mouse")
-        edited = self._plot(material, materials.edits.scene[name], which)
-        edited = self._actions(materials, name, edited, which)
+        edited = self._plot(material, self.edits.scene[name], which)
+        edited = self._actions(name, edited, which)
         if edited != material:
-            materials.edits.change(name, edited)
+            self.change(name, edited)
 
-    def _actions(self, materials: Materials, name: str, material: Material, which: Which) -> Material:
+    def _actions(self, name: str, material: Material, which: Which) -> Material:
         """Draw the buttons; return the material after them."""
         asked: list[Material] = []
-        values, scene = values_of(material, which), materials.edits.scene[name]
-        buttons(
-            [
-                (
-                    "smooth",
-                    True,
-                    lambda: asked.append(with_values(material, which, smoothed(values))),
-                    "averages each node with its neighbours",
-                ),
-                (
-                    "reset",
-                    material != scene,
-                    lambda: asked.append(_reset(material, scene, which)),
-                    "restores the curve as baked",
-                ),
-                (
-                    "exact here",
-                    self._can_edit,
-                    self._edit,
-                    "opens this view under exact direct light",
-                ),
-            ]
-        )
-        others = [other for other in materials.edits.scene if other != name]
+        values, scene = values_of(material, which), self.edits.scene[name]
+        smooth = lambda: asked.append(with_values(material, which, smoothed(values)))  # noqa: E731
+        reset = lambda: asked.append(_reset(material, scene, which))  # noqa: E731
+        buttons([
+            ("smooth", True, smooth, "averages each node with its neighbours"),
+            ("reset curve", material != scene, reset, "restores the curve as baked"),
+            *self._exact_here,
+        ])  # fmt: skip
+        others = [other for other in self.edits.scene if other != name]
         chosen = choice("copy from", "", ["", *others], "takes this curve of another material of the scene")
-        if chosen and (taken := copied(material, which, materials.edits.current(chosen))) is not None:
+        if chosen and (taken := copied(material, which, self.edits.current(chosen))) is not None:
             asked.append(taken)
         elif chosen:
-            self.state.screen.say(f"{chosen} has no {TITLES[which.kind]} of this kind")
+            self.say(f"{chosen} has no {TITLES[which.kind]} of this kind")
         return asked[-1] if asked else material
 
     @property
-    def _can_edit(self) -> bool:
-        return self.state.session.keeps and self.state.rebaking.possible
-
-    def _edit(self) -> None:
-        edit_view(self.state)
+    def _exact_here(self) -> list[tuple[str, bool, Callable[[], None], str]]:
+        meaning = "opens this view under exact direct light"
+        return [] if self.open_view is None else [("exact here", self.can_open(), self.open_view, meaning)]
 
     def _plot(self, material: Material, scene: Material, which: Which) -> Material:
         """Draw the curve; return the material after a pull."""

@@ -6,8 +6,10 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 
 from lambent.core.errors import UserError
+from lambent.editing.session.document import SessionDocument, document_from
+from lambent.editing.session.session import Session, with_materials
 from lambent.store.kept.images import names_of_images, readable, remove_unused
-from lambent.store.kept.session import FORMER_BACKUP, KeptView, WalkSession, read_session
+from lambent.store.kept.session import FILE, FORMER_BACKUP, EditedView, KeptView, WalkSession, read_session
 from lambent.store.kept.states import images_of_variants
 from lambent.viewer.edits.edits import MaterialEdits
 from lambent.viewer.edits.session_file import SOON_S, SessionFile, moved_aside
@@ -24,21 +26,24 @@ class SessionKeeper(SessionFile):
         self._edits = edits
         self.view: Callable[[], KeptView | None] = lambda: None
         self._foreign: dict[str, object] = {}  # materials of the present state that the store lacks
+        self._sections: dict[str, tuple[tuple[object, object], EditedView]] = {}
 
-    def open(self, groups: Collection[str] = (), *, fresh: bool = False) -> tuple[str, ...]:
+    def open(self, groups: Collection[str] | None = (), *, fresh: bool = False) -> tuple[str, ...]:
         """Open the session of the store; return lines on problems. `fresh` begins with the store as baked.
 
-        `groups` are names of the store's light groups.
+        `groups` are names of the store's light groups; None: whatever the session names.
         """
         if self._folder is None:
             return ()
         lines = self.read(self._folder, fresh=fresh)
-        self._edits.begin_from(self.opened)
+        self._edits.begin_from(self.opened, self._views())
         if (history := self._screen.histories.pop(self._folder, None)) is not None:
             self._edits.resume(history)
         if not self.fault and not fresh:
             lines += self._take_former_backup(self._folder / FORMER_BACKUP)
         session = self._edits.session
+        if groups is None:
+            groups = {name for room in (*self.opened.rooms, *session.rooms) for name in room.light.groups}
         self._foreign = {k: v for k, v in self.opened.now.materials.items() if k not in self._edits.scene}
         if unknown := sorted(
             {*self.opened.unknown(self._edits.scene, groups), *session.unknown(self._edits.scene, groups)}
@@ -47,6 +52,17 @@ class SessionKeeper(SessionFile):
         faults = (readable(room.textures, self._folder)[1] for room in session.rooms)
         lines += dict.fromkeys(fault for of_room in faults for fault in of_room)
         return tuple(lines)
+
+    def _views(self) -> dict[str, SessionDocument]:
+        """The session's edited views that can be used as they are; the mode that opens another one says why not."""
+        found = {}
+        for name, view in self.opened.edited.items():
+            try:
+                if view.document.get("version") != 1:
+                    found[name] = document_from(view.document, (self._folder or Path()) / FILE)
+            except UserError:
+                continue
+        return found
 
     def _take_former_backup(self, file: Path) -> list[str]:
         """Take the unsaved changes that a window of version 1 left; the file goes with the next write."""
@@ -63,12 +79,26 @@ class SessionKeeper(SessionFile):
 
     @property
     def session(self) -> WalkSession:
-        changes: dict[str, object] = {"view": self.view() or self.opened.view, "edited": self.opened.edited}
+        edited = {name: self._section(name, view) for name, view in self._edits.views.items()}
+        changes = {"view": self.view() or self.opened.view, "edited": {**self.opened.edited, **edited}}
         session = self._edits.session.model_copy(update=changes)
         if not self._foreign:
             return session
         now = session.now.model_copy(update={"materials": {**self._foreign, **session.now.materials}})
         return session.model_copy(update={"now": now})
+
+    def _section(self, name: str, view: SessionDocument) -> EditedView:
+        """A view edited in place, as the store has it: its files by the store's folder, also of a store that moves."""
+        of = view, self._edits.edited
+        made = self._sections.get(name)
+        if made is None or any(a is not b for a, b in zip(of, made[0], strict=True)):
+            known = {
+                material: self._edits.current(material) for material in view.materials if material in self._edits.scene
+            }
+            placed = Session(with_materials(view, known), self._folder or Path()).placed(self._folder or Path())
+            whole = placed.model_copy(update={"scene": "."})
+            made = self._sections[name] = of, EditedView(document=whole.model_dump(mode="json"))
+        return made[1]
 
     @property
     def unsaved(self) -> tuple[str, ...]:
