@@ -125,7 +125,14 @@ def document_from(data: Any, path: Path) -> SessionDocument:
             "unsupported session version", file=path, field="version", got=version, expected=VERSION, hint=hint
         )
     if version == 1:
+        said = data.get("materials", {})
+        rest = {name: {"start": {}, "now": {}} for name in said} if isinstance(said, dict) else said
+        _validated({**data, "version": VERSION, "materials": rest}, path)  # before lobes are fitted to curves
         data = upgraded(data, path)
+    return _validated(data, path)
+
+
+def _validated(data: dict[str, Any], path: Path) -> SessionDocument:
     try:
         return SessionDocument.model_validate(data)
     except ValidationError as error:
