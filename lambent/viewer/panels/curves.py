@@ -34,6 +34,7 @@ TITLES = {"shape": "highlight", "fresnel": "reflectance by angle", "diffuse": "d
 ANGLES = {"shape": "theta_h", "fresnel": "theta_d", "diffuse": "theta of light and eye"}
 TICKS_DEG = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 60.0, 85.0)
 HEIGHT_PX, NODE_PX, NEAR_PX = 190.0, 3.5, 18.0
+APART = 3.0  # nodes between two ticks, whose texts would overlap
 DECADES, HEADROOM = 7, 4.0  # of the axis of a highlight, below and above its largest value
 _PLOT = implot.Flags_.no_menus | implot.Flags_.no_box_select | implot.Flags_.no_mouse_text | implot.Flags_.no_legend
 _X, _Y = implot.ImAxis_.x1, implot.ImAxis_.y1
@@ -177,8 +178,12 @@ def _places(material: Material, which: Which) -> tuple[Floats, list[tuple[float,
     if which.kind != "shape":
         return angles, [(float(tick), f"{tick:g}°") for tick in range(0, 91, 15)]
     places = np.arange(len(angles), dtype=float)
-    ticks = [tick for tick in TICKS_DEG if tick <= angles[-1]]
-    return places, [(float(np.interp(tick, angles, places)), f"{tick:g}°") for tick in ticks]
+    ticks: list[tuple[float, str]] = []
+    for tick in TICKS_DEG:
+        place = float(np.interp(tick, angles, places))
+        if tick <= angles[-1] and (not ticks or place - ticks[-1][0] >= APART):
+            ticks.append((place, f"{tick:g}°"))
+    return places, ticks
 
 
 def _limits(values: Floats, which: Which) -> tuple[float, float]:

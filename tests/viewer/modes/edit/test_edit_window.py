@@ -35,10 +35,8 @@ def test_a_scene_is_baked_edited_and_opened_again(opened, tmp_path):
     x, y = 0.5 * 600, 150 + 0.55 * 600
     session.click(x, y)
     session.wait_for(lambda state: state["selected"] == "glaze" and (state["pointed"] or [0, 0])[1] == "glaze")
-    session.click(*session.point("diffuse##curve", 0.1))
-    session.click(*session.point("all##preset"))
-    pull(session, 0.7, 0.3)
-    edited = session.wait_for(lambda state: state["edited"]["glaze"] == ["diffuse"] and not state["busy"])
+    pull(session, 0.6, 0.15)
+    edited = session.wait_for(lambda state: state["edited"]["glaze"] and not state["busy"])
     assert edited["brightness"] > 1.02 * before["brightness"]
     session.tool("key", "ctrl+z")
     session.wait_for(lambda state: not state["edited"]["glaze"] and not state["busy"])
@@ -50,7 +48,7 @@ def test_a_scene_is_baked_edited_and_opened_again(opened, tmp_path):
     assert read_image(tmp_path / "teatray-001.exr").mean() == pytest.approx(edited["brightness"], rel=1e-2)
     session.tool("key", "ctrl+s")
     session.wait_for(lambda state: any("edits.json" in text for text in state["messages"]))
-    fold(session, "Material", "View")
+    fold(session, "Material", "Curves", "View")
     session.click(*session.point("Interreflections"))
     session.wait_for(lambda state: "glaze##edited" in state["rects"])
     session.click(*session.point("bake"))
@@ -59,7 +57,7 @@ def test_a_scene_is_baked_edited_and_opened_again(opened, tmp_path):
     assert 1.02 * edited["brightness"] < bounced["brightness"] < 3 * edited["brightness"]
     assert session.close() == 0, session.log()
     saved = Session.open(tmp_path / "teatray-001.edits.json")
-    assert list(saved.document.materials["glaze"].curves) == ["diffuse"]
+    assert saved.material("glaze").now.lobes[0].distribution == "curve"
 
     again = opened(tmp_path / "teatray-001.edits.json", tmp_path)
     there = again.wait_for(lambda state: state["lights"] == LAST and state["samples"] >= 64 and not state["busy"])
@@ -79,9 +77,8 @@ def fold(session, *headers):
 
 
 def pull(session, begin, end):
-    """Drag in the plot of the curve, between shares of its height."""
+    """Pull a node in the tail of the curve, between shares of the plot's height."""
     rects = session.state()["rects"]
-    left, right = rects["log"][0] + 40, rects["all##preset"][2]
-    top, bottom = rects["log"][3] + 20, rects["all##preset"][1] - 120
-    x = (left + right) / 2
+    top, bottom = rects["tool"][3] + 10, rects["smooth"][1] - 45
+    x = 0.3 * rects["tool"][0] + 0.7 * rects["tool"][2]
     session.drag((x, top + begin * (bottom - top)), (x, top + end * (bottom - top)))
