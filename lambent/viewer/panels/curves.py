@@ -10,6 +10,7 @@ import numpy as np
 from imgui_bundle import imgui, implot
 
 from lambent.core.arrays import Floats
+from lambent.core.errors import UserError
 from lambent.editing.curves.nodes import (
     LEAST,
     Which,
@@ -23,9 +24,12 @@ from lambent.editing.curves.nodes import (
     with_values,
 )
 from lambent.materials.document import Material
+from lambent.viewer.background.fitting import Fitting
+from lambent.viewer.editor.files import typed_path
 from lambent.viewer.edits.edits import MaterialEdits
 from lambent.viewer.panels.plots import BLUE, GREEN, MEASURED, MODEL, RED
-from lambent.viewer.panels.widgets import buttons, choice, explain, px
+from lambent.viewer.panels.widgets import buttons, choice, explain, path_field, px
+from lambent.viewer.screen import Screen
 
 Tool = Literal["pull", "pull softly", "draw"]
 TOOLS: tuple[Tool, ...] = get_args(Tool)
@@ -47,10 +51,12 @@ class CurvesPanel:
     selected: Callable[[], str | None]  # name of the material
     edits: MaterialEdits
     change: Callable[[str, Material], None]
-    say: Callable[[str], None]
+    screen: Screen
+    fitting: Fitting
     open_view: Callable[[], None] | None = None
     can_open: Callable[[], bool] = lambda: True
     title: str = ""  # of the curve
+    typed: str = ""  # path of a measurement
     channels: str = "together"
     tool: Tool = "pull"
     node: int | None = None  # held
@@ -92,8 +98,33 @@ class CurvesPanel:
         if chosen and (taken := copied(material, which, self.edits.current(chosen))) is not None:
             asked.append(taken)
         elif chosen:
-            self.say(f"{chosen} has no {TITLES[which.kind]} of this kind")
+            self.screen.say(f"{chosen} has no {TITLES[which.kind]} of this kind")
+        meaning = "takes this curve of a measured file, to which a lobe of curves is fitted first"
+        self.typed, wanted = path_field("curve of", self.typed, "copy", "or from a measured file...", meaning)
+        if wanted:
+            self._copy_measured(name, which)
+        if self.fitting.busy:
+            imgui.text_disabled(self.fitting.doing)
         return asked[-1] if asked else material
+
+    def _copy_measured(self, name: str, which: Which) -> None:
+        """Fit a lobe of curves to the typed file, and take its curve, as a step of its own."""
+
+        def done(found: Material) -> None:
+            taken = copied(self.edits.current(name), which, found)
+            if taken is None:
+                self.screen.say(f"{file.name} has no {TITLES[which.kind]} of this kind")
+                return
+            self.edits.end_stroke()
+            self.change(name, taken)
+            self.edits.end_stroke()
+            self.screen.say(f"{name} has the {TITLES[which.kind]} of {file.name}")
+
+        try:
+            file = typed_path(self.typed)
+            self.fitting.begin(file, "curve", done)
+        except UserError as error:
+            self.screen.say(f"not loaded: {error}")
 
     @property
     def _exact_here(self) -> list[tuple[str, bool, Callable[[], None], str]]:

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
 from lambent.core.errors import UserError
 from lambent.core.plain import plain_name
-from lambent.core.progress import Progress
 from lambent.editing.session.document import Surroundings
 from lambent.materials.document import Material, load_material
-from lambent.viewer.background.work import Work, pending
+from lambent.viewer.background.fitting import Fitting
 from lambent.viewer.editor.files import kind_of, typed_path, with_account
 from lambent.viewer.edits.edits import unused
 from lambent.viewer.modes.edit.subject import SESSION_ENDING, Subject
@@ -35,17 +34,8 @@ class Files:
         self._stem = plain_name(subject.name, "scene")
         self.home, self.keeper = subject.home, subject.keeper
         self.typed: dict[str, str] = {}
-        self._work: Work | None = None
+        self.fitting = Fitting(screen)
         self._saved = self._session.document
-
-    @property
-    def busy(self) -> bool:
-        return self._work is not None
-
-    @property
-    def doing(self) -> str:
-        """The running task, for people; empty without one."""
-        return f"{self._work.what} {100 * self._work.share:.0f} %" if self._work is not None else ""
 
     @property
     def unsaved(self) -> bool:
@@ -53,16 +43,14 @@ class Files:
         return self._session.document != self._saved and (self.keeper is None or bool(self.keeper.fault))
 
     def poll(self) -> None:
-        """Handle the end of the running task, and keep the session."""
-        self._work = pending(self._work)
+        """Take a finished fit, and keep the session."""
+        self.fitting.poll()
         if self.keeper is not None:
             self.keeper.tick()
 
     def close(self) -> None:
-        """Cancel the running task, and release the store's session."""
-        if self._work is not None:
-            self._work.cancel()
-            self._work = None
+        """Cancel a running fit, and release the store's session."""
+        self.fitting.close()
         if self.keeper is not None:
             self.keeper.close()
 
@@ -121,7 +109,7 @@ class Files:
             elif kind == "material":
                 self._become(material, path, load_material(path))
             else:
-                self._fit(material, path)
+                self.fitting.begin(path, "auto", partial(self._become, material, path))
         except UserError as error:
             self._screen.say(f"not loaded: {error}")
 
@@ -132,20 +120,6 @@ class Files:
         light = Surroundings(file=str(path.resolve()))
         self._session.history.change(self._session.document.model_copy(update={"environment": light}))
         self._screen.say(f"environment {path.name}: the picture follows once its transport is baked")
-
-    def _fit(self, material: str, path: Path) -> None:
-        if self._work is not None:
-            raise UserError(f"still {self.doing}", hint="wait until it is done")
-
-        def run(progress: Progress) -> Material:
-            from lambent.materials.fitting.fit import fit  # loads SciPy
-            from lambent.materials.measured import load
-
-            return fit(load(path), lobes="auto", source=path, progress=progress).material
-
-        done: Callable[[Material], None] = partial(self._become, material, path)
-        self._work = Work(run, done, lambda error: self._screen.say(f"not loaded: {error}"))
-        self._work.what = f"fitting {path.name}"
 
     def _become(self, name: str, path: Path, material: Material) -> None:
         self._session.history.end_stroke()

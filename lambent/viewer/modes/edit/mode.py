@@ -111,8 +111,8 @@ class EditMode(Mode):
             lines.append("reading transport")
         if state.bounced.line:
             lines.append(state.bounced.line)
-        if state.files.busy:
-            lines.append(state.files.doing)
+        if state.files.fitting.busy:
+            lines.append(state.files.fitting.doing)
         frame = state.painter.frame
         if frame is not None and frame.needed:
             lines.append(f"waiting for transport, shown without the edit: {', '.join(sorted(frame.needed))}")
@@ -138,7 +138,7 @@ class EditMode(Mode):
 
 def columns(state: EditState) -> tuple[Panel, ...]:
     """Panels of the column."""
-    curves = CurvesPanel(lambda: state.selected, state.subject.edits, state.change, state.screen.say)
+    curves = CurvesPanel(lambda: state.selected, state.subject.edits, state.change, state.screen, state.files.fitting)
     return (
         Panel(
             "Material",

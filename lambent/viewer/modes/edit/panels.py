@@ -30,7 +30,7 @@ LEAST_CHOICE_PX = 80.0
 def draw_head(state: EditState, keeper: SessionKeeper) -> None:
     """Draw the way back to the room, and lines on the store's session, where it is not kept or not taken over whole."""
     meaning = "walks through the room from here, with its materials as edited"
-    buttons([("walk from here", keeper.keeps and not state.files.busy, state.enter_room, meaning)])
+    buttons([("walk from here", keeper.keeps and not state.files.fitting.busy, state.enter_room, meaning)])
     lines = dict.fromkeys(line for line in (keeper.fault, *state.subject.lines) if line)
     wrapped(list(lines), AMBER)
 
@@ -156,5 +156,5 @@ def draw_files(state: EditState) -> None:
     ])  # fmt: skip
     if files.home is not None:
         coloured(files.home.name + (" (changed)" if files.unsaved else ""), DIM)
-    if files.busy:
-        coloured(files.doing, DIM)
+    if files.fitting.busy:
+        coloured(files.fitting.doing, DIM)

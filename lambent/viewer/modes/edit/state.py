@@ -112,7 +112,7 @@ class EditState:
     @property
     def busy(self) -> bool:
         """Whether background work with visible progress runs."""
-        return self.baking is not None or self.loading.busy or self.files.busy or self.bounced.busy
+        return self.baking is not None or self.loading.busy or self.files.fitting.busy or self.bounced.busy
 
     @property
     def is_difference(self) -> bool:

@@ -21,6 +21,7 @@ from lambent.realtime.sun.turned_sky import under_turned_sky
 from lambent.scenes.replacement import parse_replacements
 from lambent.store.source import SOURCE
 from lambent.store.store import Store
+from lambent.viewer.background.fitting import Fitting
 from lambent.viewer.background.lost import rescued
 from lambent.viewer.background.work import POLL_S
 from lambent.viewer.cameras.navigation import Movement
@@ -114,7 +115,9 @@ class WalkMode(Mode):
         self, state: WalkState, input: WalkInput, drawing: Drawing, falling: FallingLight | None = None
     ) -> None:
         self.finishes = Finishes(state.materials.edits, state.texturing, state.screen)
-        super().__init__(state.scene.name, state.screen, input, drawing, panels(state, falling, self.finishes))
+        self.fitting = Fitting(state.screen)
+        of_column = panels(state, falling, self.finishes, self.fitting)
+        super().__init__(state.scene.name, state.screen, input, drawing, of_column)
         self.state, self.falling = state, falling
         self.head = partial(room.draw, state)
 
@@ -159,12 +162,18 @@ class WalkMode(Mode):
         self.state.recordings.follow()
         if self.state.materials.editor is not None:
             self.state.materials.editor.tick()
+        self.fitting.poll()
         self.state.session.tick()
 
     def wait_s(self) -> float | None:
         editor = self.state.materials.editor
         busy = self.state.recordings.recorder.on or (editor is not None and editor.busy)
-        busy = busy or self.state.texturing.thumbnails.busy or (self.falling is not None and self.falling.busy)
+        busy = (
+            busy
+            or self.fitting.busy
+            or self.state.texturing.thumbnails.busy
+            or (self.falling is not None and self.falling.busy)
+        )
         return least(POLL_S if busy else None, self.state.session.wait_s())
 
     def drop(self, path: str) -> None:
@@ -193,6 +202,7 @@ class WalkMode(Mode):
         self.drawing.close()  # a running film leaves no file
 
     def close(self) -> None:
+        self.fitting.close()
         self.state.materials.close_editor()
         rescued("the recorded walk", self.state.recordings.rescue)
         self.state.session.close()
@@ -200,12 +210,12 @@ class WalkMode(Mode):
             sys.stderr.write(f"lambent: note: changes not saved: {names}\n")
 
 
-def panels(state: WalkState, falling: FallingLight | None, finishes: Finishes) -> tuple[Panel, ...]:
+def panels(state: WalkState, falling: FallingLight | None, finishes: Finishes, fitting: Fitting) -> tuple[Panel, ...]:
     """Panels of the column, sorted into the sizes of the window."""
     light_on_it = partial(metering.draw_falling, falling, state)
     edits = state.materials.edits
     edit, can_edit = partial(edit_view, state), lambda: state.session.keeps and state.rebaking.possible
-    curves = CurvesPanel(lambda: state.selection.material, edits, edits.change, state.screen.say, edit, can_edit)
+    curves = CurvesPanel(lambda: state.selection.material, edits, edits.change, state.screen, fitting, edit, can_edit)
     of_lamps = SizedPanel("Lamps", partial(lamps.draw, state.lamps), "move, aim and exchange a lamp of the scene")
     return (
         SizedPanel("Material", partial(material.draw, state, finishes), "the selected object, its material", True),

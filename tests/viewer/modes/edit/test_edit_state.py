@@ -296,8 +296,8 @@ def test_a_measured_table_is_fitted_and_its_fit_is_a_step(ready, tmp_path):
     table = write_measurement(tmp_path / "paper.astm", Material(kd=(0.6, 0.5, 0.4)))
     state.files.open(str(table), "wall")
     with pytest.raises(UserError, match="still fitting"):
-        state.files._fit("wall", table)
-    until(state, lambda: not state.files.busy)
+        state.files.fitting.begin(table, "auto", print)
+    until(state, lambda: not state.files.fitting.busy)
     assert np.allclose(state.session.material("wall").now.kd, (0.6, 0.5, 0.4), atol=0.02)
     assert state.session.material("wall").now.provenance.source == "paper.astm"
     state.session.undo()

@@ -4,6 +4,10 @@ import numpy as np
 import pytest
 
 from lambent.editing.curves.nodes import Which, values_of
+from lambent.materials.document import Lobe, Material
+from lambent.materials.lobes import widths
+from tests.viewer import waiting
+from tests.viewer.editor.measured_specimens import write_measurement
 from tests.viewer.panel_driver import PanelDriver, walk_mode
 
 SHAPE, FRESNEL, DIFFUSE = Which("shape"), Which("fresnel"), Which("diffuse")
@@ -70,6 +74,25 @@ def test_curves_are_smoothed_and_put_back(driver, state):
     assert np.abs(np.diff(np.log(values_of(edits.current("brass"), SHAPE)[:, 0]), 2)).max() < bumpy
     driver.click("reset curve")
     assert edits.current("brass") == edits.scene["brass"]
+
+
+def test_a_curve_is_copied_from_a_measurement(driver, state, tmp_path):
+    rough = Material(name="rough", kd=0.05, lobes=(Lobe(mx=0.3, my=0.3, k=(0.9, 0.8, 0.5), r0=0.6),))
+    write_measurement(tmp_path / "rough.txt", rough)
+    edits, panel = state.materials.edits, driver.mode.panels[1].draw.__self__
+    before = edits.current("brass")
+    panel.typed = str(tmp_path / "rough.txt")
+    driver.click("copy##curve of")
+    assert driver.mode.fitting.busy and driver.mode.wait_s() is not None
+    waiting.until(lambda: not driver.mode.fitting.busy, driver.mode.fitting.poll)
+    (lobe,) = edits.current("brass").lobes
+    assert widths(lobe)[0] == pytest.approx(0.3, rel=0.15) and edits.current("brass").kd == before.kd
+    edits.undo()
+    assert edits.current("brass") == before
+    panel.typed = str(tmp_path / "none.txt")
+    driver.click("copy##curve of")
+    waiting.until(lambda: not driver.mode.fitting.busy, driver.mode.fitting.poll)
+    assert "none.txt" in state.screen.messages[-1].text
 
 
 def test_nothing_can_be_pulled_without_an_object(driver, state):
