@@ -1,3 +1,47 @@
-"""Lambent: real, measured materials where they will live."""
+"""Lambent: real, measured materials where they will live.
+
+table = lambent.read("brushed.bsdf")                    # or a material, a scene, a store, an image
+material = table.fit(lobes="auto").material
+store = lambent.open("room.store")
+store.render("entrance", size=(640, 360)).save("entrance.png")
+
+Names are imported at their first use.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from lambent.api.materials import Material as Material
+    from lambent.api.pictures import Comparison as Comparison
+    from lambent.api.pictures import Picture as Picture
+    from lambent.api.pictures import compare as compare
+    from lambent.api.reading import open as open
+    from lambent.api.reading import read as read
+    from lambent.api.scenes import Scene as Scene
+    from lambent.api.stores import Store as Store
+    from lambent.api.tables import Fit as Fit
+    from lambent.api.tables import Table as Table
+    from lambent.core.errors import UserError as UserError
 
 __version__ = "0.1.0"
+_MODULES = {
+    "Comparison": "api.pictures", "Fit": "api.tables", "Material": "api.materials", "Picture": "api.pictures",
+    "Scene": "api.scenes", "Store": "api.stores", "Table": "api.tables", "UserError": "core.errors",
+    "compare": "api.pictures", "open": "api.reading", "read": "api.reading",
+}  # fmt: skip
+__all__ = ["__version__", *_MODULES]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module 'lambent' has no attribute {name!r}")
+    found = getattr(import_module(f"lambent.{_MODULES[name]}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

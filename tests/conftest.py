@@ -73,3 +73,15 @@ def mi() -> Any:
     import mitsuba
 
     return mitsuba
+
+
+@pytest.fixture(scope="session")
+def baked_box(mi: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a store of the built-in box."""
+    from lambent.bake.bake import bake
+    from lambent.scenes import load_scene
+    from tests.bake.small_scenes import TINY
+
+    folder = tmp_path_factory.mktemp("baked") / "box.store"
+    bake(load_scene("builtin:box"), folder, quality=TINY).close()
+    return folder

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from lambent.cli.console import Force, Json, show, table
-from lambent.core.errors import UserError
 
 
 def command(
@@ -25,21 +24,17 @@ def command(
 
     Example: lambent compare reference.exr frame.exr -o difference.png
     """
+    from lambent.api.pictures import compare
     from lambent.core.light.colour import srgb_decode
     from lambent.core.outputs import check_output
-    from lambent.core.pictures.images import HDR_SUFFIXES, read_image, write_image
-    from lambent.core.pictures.metrics import compare
+    from lambent.core.pictures.images import write_image
 
     if output is not None:
         check_output(output, (".png",), force=force, inputs=[reference, test])
-    images = read_image(reference), read_image(test)
-    if images[0].shape != images[1].shape:
-        sizes = ["{1}x{0}".format(*image.shape) for image in images]
-        raise UserError("differs in size", file=test, got=sizes[1], expected=f"{sizes[0]}, the size of {reference}")
-    radiance = all(path.suffix.lower() in HDR_SUFFIXES for path in (reference, test))
-    result, difference = compare(*images, radiance=radiance)
+    compared = compare(reference, test)
+    result = compared.figures
     if output is not None:
-        write_image(output, srgb_decode(difference))
+        write_image(output, srgb_decode(compared.difference))
         result["difference"] = output
     row, column = result["flip_worst_tile_at"]
     rows = [

@@ -5,18 +5,15 @@ from __future__ import annotations
 import json
 import logging
 import sys
-import time
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal
 
 import typer
 
 import lambent
+from lambent.api.progress import progress_bar as progress_bar
 from lambent.core.errors import UserError
-from lambent.core.interruption import was_interrupted
 from lambent.core.plain import plain, printable
-from lambent.core.progress import Progress
 
 Between = Annotated[
     Literal["auto", "half_vector", "back_vector", "quadrilinear"],
@@ -84,76 +81,6 @@ def metric_errors(errors: Mapping[str, float], share: Mapping[str, float]) -> st
 
     rows = ((name, f"{value:.3g}", METRICS[name].unit, f"{share[name]:.2%}") for name, value in errors.items())
     return table([("error", "absolute", "unit", "relative"), *rows])
-
-
-@contextmanager
-def progress_bar() -> Iterator[Progress]:
-    """A bar with the time left on stderr; if stderr is no terminal, a line for each step with its time.
-
-    Raises `KeyboardInterrupt` at the next step if a library has dropped the one of Ctrl-C.
-    """
-    if not sys.stderr.isatty():
-        lines = _StepLines()
-        try:
-            yield _interruptible(lines)
-        except BaseException:
-            lines.end("stopped after ")
-            raise
-        lines.end()
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bars
-
-    console = Console(stderr=True)
-    columns = TextColumn("{task.description}", markup=False), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
-    with Bars(*columns, console=console, transient=True) as bars:
-        tasks: dict[str, Any] = {}
-
-        def update(done: float, total: float, what: str) -> None:
-            if what not in tasks:
-                for other in tasks.values():
-                    bars.update(other, visible=False)
-                tasks[what] = bars.add_task(printable(what), total=total)
-            bars.update(tasks[what], completed=done, total=total, visible=True)
-
-        yield _interruptible(update)
-
-
-def _interruptible(progress: Progress) -> Progress:
-    def report(done: float, total: float, what: str) -> None:
-        if was_interrupted():
-            raise KeyboardInterrupt
-        progress(done, total, what)
-
-    return report
-
-
-class _StepLines:
-    """Prints a line on stderr for each step longer than half a second, and one per minute during a step."""
-
-    SHORTEST_S = 0.5
-    STILL_S = 60.0
-
-    def __init__(self) -> None:
-        self.step = ""
-        self.begun = self.said = time.monotonic()
-
-    def __call__(self, done: float, total: float, what: str) -> None:
-        now = time.monotonic()
-        if what != self.step:
-            self.end()
-            self.step, self.begun, self.said = what, now, now
-        elif now - self.said >= self.STILL_S:
-            self.said = now
-            say(f"{what}: {min(done / max(total, 1e-9), 1):.0%} after {now - self.begun:.0f} s")
-
-    def end(self, outcome: str = "") -> None:
-        """Print the time of the current step, if there is one."""
-        seconds = time.monotonic() - self.begun
-        if self.step and seconds >= self.SHORTEST_S:
-            say(f"{self.step}: {outcome}{seconds:.1f} s")
-        self.step = ""
 
 
 def parse_size(text: str, option: str = "--size") -> tuple[int, int]:

@@ -197,6 +197,11 @@ class Material(_Strict):
         write_text(path, json.dumps(self.model_dump(mode="json"), indent=2) + "\n")
 
 
+def is_document(head: bytes) -> bool:
+    """Whether a file that begins with `head` is a material document; a byte order mark is allowed."""
+    return head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{")
+
+
 def load_material(path: Path) -> Material:
     """Read a material document.
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lambent.cli import console
+from lambent.api import progress as bars
 from lambent.cli.console import progress_bar, table
 from lambent.core.errors import UserError
 from lambent.core.pictures.images import write_shown
@@ -71,7 +71,7 @@ def test_file_names_that_are_no_text(lambent, material, tmp_path):
 def test_steps_of_redirected_output_are_lines(capsys, monkeypatch):
     """A log has a line for each step that took a while, one a minute meanwhile, and the step that was interrupted."""
     now = [0.0]
-    monkeypatch.setattr(console.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(bars.time, "monotonic", lambda: now[0])
     with pytest.raises(KeyboardInterrupt), progress_bar() as progress:
         for now[0], done, step in (0, 0, "light map"), (10, 1, "light map"), (70, 3, "light map"), (75, 0, "short"):
             progress(done, 4, step)
@@ -205,7 +205,7 @@ def test_an_error_of_memory_is_one_line(refused, monkeypatch, tmp_path: Path, er
         raise error
 
     Image.new("L", (8, 8)).save(tmp_path / "a.png")
-    monkeypatch.setattr("lambent.core.pictures.images.read_image", fails)
+    monkeypatch.setattr("lambent.api.pictures.read_image", fails)
     assert "out of memory" in refused("inspect", tmp_path / "a.png")
 
 

@@ -48,18 +48,13 @@ def command(
 def subject_of(file: Path, reconstruction: Between = "auto") -> Subject:
     """The material of a JSON document, or the table of a measured file."""
     from lambent.materials import measured
-    from lambent.materials.document import load_material
+    from lambent.materials.document import is_document, load_material
 
     if not is_document(read_head(file, 64)):
         return measured.load(file, reconstruction)
     if reconstruction != "auto":
         raise UserError("applies to measured tables only", file=file, field="--reconstruction")
     return load_material(file)
-
-
-def is_document(head: bytes) -> bool:
-    """Whether a file that begins with `head` is a material document; a byte order mark is allowed."""
-    return head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{")
 
 
 def _check_kind(subject: Subject, writer: Writer, file: Path) -> None:

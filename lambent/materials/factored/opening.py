@@ -19,7 +19,7 @@ from lambent.core.inputs import read_head
 from lambent.core.plain import triple
 from lambent.core.progress import Progress, silent
 from lambent.materials.bsdf import MaterialBSDF
-from lambent.materials.document import Material, load_material
+from lambent.materials.document import Material, is_document, load_material
 from lambent.materials.factored.curve import END_RAD, KNOTS, Curve, angles_rad
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.of_models import editable
@@ -107,7 +107,8 @@ def editable_of(subject: Path | str | Material | Model | MeasuredTable, progress
     """
     if isinstance(subject, Path | str):
         path = Path(subject)
-        return editable_of(load_material(path) if _begins_as_json(path) else load(path), progress)
+        is_json = path.is_file() and is_document(read_head(path, 64))
+        return editable_of(load_material(path) if is_json else load(path), progress)
     if isinstance(subject, Material):
         return _judged_everywhere(of_material(subject), MaterialBSDF(subject).eval)
     if isinstance(subject, Model):
@@ -117,10 +118,6 @@ def editable_of(subject: Path | str | Material | Model | MeasuredTable, progress
         plain = replace(found, terms=tuple(replace(term, quotient=One()) for term in found.terms))
         return judged(found, subject.samples(), plain)
     return factorise(subject, progress)
-
-
-def _begins_as_json(path: Path) -> bool:
-    return path.is_file() and read_head(path, 64).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{")
 
 
 def _judged_everywhere(found: Editable, evaluate: Callable[[Floats, Floats], Floats]) -> Factored:

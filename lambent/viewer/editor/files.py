@@ -9,7 +9,7 @@ from typing import Literal
 from lambent.core.errors import UserError
 from lambent.core.inputs import read_head
 from lambent.core.plain import plain_name
-from lambent.materials.document import Material, Provenance, load_material
+from lambent.materials.document import Material, Provenance, is_document, load_material
 from lambent.viewer.background.work import Work, pending
 from lambent.viewer.editor.measurement import Measurement, read_measurement
 from lambent.viewer.editor.subject import Subject, same_numbers
@@ -27,7 +27,7 @@ def kind_of(path: Path) -> Kind:
     if path.suffix.lower() in ENVIRONMENTS:
         return "environment"
     head = read_head(path, 64)
-    return "material" if head.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{") else "measurement"
+    return "material" if is_document(head) else "measurement"
 
 
 def with_account(

@@ -2,18 +2,7 @@
 
 import pytest
 
-from lambent.bake.bake import bake
-from lambent.scenes import load_scene
-from tests.bake.small_scenes import TINY
 from tests.viewer.panel_driver import PanelDriver, walk_mode
-
-
-@pytest.fixture(scope="session")
-def baked_box(mi, tmp_path_factory):
-    """Folder of a store of the built-in box."""
-    folder = tmp_path_factory.mktemp("baked") / "box.store"
-    bake(load_scene("builtin:box"), folder, quality=TINY).close()
-    return folder
 
 
 @pytest.fixture

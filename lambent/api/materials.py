@@ -1,0 +1,98 @@
+"""Materials, as documents and as BSDFs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lambent.core.arrays import Floats
+from lambent.core.geometry.directions import direction
+from lambent.materials.bsdf import MaterialBSDF
+from lambent.materials.document import Material as Document
+from lambent.materials.document import load_material
+
+ALBEDO_AT_DEG = (0, 30, 60)
+
+
+class Material:
+    """A material: a document of numbers, and the BSDF that they are.
+
+    Directions are unit vectors (..., 3) in the local frame with n = +z, away from the surface: wi to the light, wo to
+    the viewer. The sides are equal (a thin sheet): wi.z wo.z > 0 is reflection, < 0 transmission. f is in 1/sr, linear
+    RGB with Rec.709 primaries, without the cosine.
+    """
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        self._bsdf = MaterialBSDF(document)
+
+    @classmethod
+    def read(cls, file: str | Path) -> Material:
+        """Read a material document; raises `UserError` if it cannot be used."""
+        return cls(load_material(Path(file)))
+
+    @property
+    def name(self) -> str:
+        return self.document.name
+
+    def eval(self, wi: Floats, wo: Floats) -> Floats:
+        """f (..., 3)."""
+        return self._bsdf.eval(np.asarray(wi, float), np.asarray(wo, float))
+
+    def pdf(self, wi: Floats, wo: Floats) -> Floats:
+        """Density (...) in 1/sr with which `sample` gives wi for wo."""
+        return self._bsdf.pdf(np.asarray(wi, float), np.asarray(wo, float))
+
+    def sample(self, wo: Floats, u: Floats) -> Floats:
+        """wi (..., 3) from wo (..., 3) and u (..., 3), uniform in [0, 1); wi.z = 0 where pdf and value are 0."""
+        return self._bsdf.sample(np.asarray(wo, float), np.asarray(u, float))
+
+    def albedo(self, wo: Floats, samples: int = 4096) -> Floats:
+        """Directional albedo (..., 3) of wo (..., 3): the integral of f |cos| over all wi, by importance sampling."""
+        return self._bsdf.albedo(np.asarray(wo, float), samples)
+
+    def save(self, file: str | Path) -> None:
+        """Write the document (.json)."""
+        self.document.save(Path(file))
+
+    def facts(self) -> dict[str, Any]:
+        """Numbers, albedo and source, by name."""
+        one = self.document
+        albedo = self.albedo(direction(np.radians(ALBEDO_AT_DEG), 0.0))
+        provenance = one.provenance.model_dump(mode="json") if one.provenance else {}
+        return {
+            "is": "material",
+            "name": one.name,
+            "kd": one.kd,
+            "kt_d": one.kt_d,
+            **{f"lobe {number}": lobe.model_dump() for number, lobe in enumerate(one.lobes, 1)},
+            "albedo": {f"{angle} deg": float(rgb.mean()) for angle, rgb in zip(ALBEDO_AT_DEG, albedo, strict=True)},
+            "source": {key: value for key, value in provenance.items() if value and not isinstance(value, dict | list)},
+            "errors": provenance.get("errors"),
+            "notes": provenance.get("notes"),
+        }
+
+    def plot(self, file: str | Path, title: str = "") -> None:
+        """Draw f in the plane of incidence (.png, .pdf, .svg)."""
+        from lambent.materials.plots import plot_plane_of_incidence
+
+        transmits = self.document.transmits
+        plot_plane_of_incidence(Path(file), self.eval, self.name, title=title or self.name, transmits=transmits)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Material) and self.document == other.document
+
+    __hash__ = None  # type: ignore[assignment]  # of a document with errors by metric
+
+    def __repr__(self) -> str:
+        albedo = self.albedo(np.array([0.0, 0.0, 1.0]), 1024).mean()
+        return f"Material({self.name!r}, {len(self.document.lobes)} lobe(s), albedo {albedo:.2f} at normal incidence)"
+
+    def _repr_png_(self) -> bytes:
+        """The material on a ball."""
+        from lambent.api.pictures import png_of
+        from lambent.viewer.modes.walk.session.thumbnails import ball
+
+        return png_of(ball(self.document, 192))
