@@ -19,7 +19,9 @@ from lambent.core.light.photometry import LM_PER_W, photometric
 from lambent.core.pictures.images import read_encoded, read_image, write_image
 from lambent.core.views.camera import Camera, CameraPath
 from lambent.editing.session.document import Surroundings
+from lambent.editing.session.session import Session
 from lambent.materials.document import Material
+from lambent.scenes import load_scene
 from lambent.scenes.geometry import placed, sphere
 from lambent.scenes.scene import Look, Scene, SceneObject, Variant
 from lambent.store.store import Store
@@ -233,6 +235,18 @@ def test_an_error_names_the_command_that_bakes_what_is_missing(lambent, refused,
 
 
 BOUNCED = "--only", "interreflection", "--view", "above:12x8", "--series", "4,1", "--samples", "4"
+
+
+def test_what_a_session_changed_is_proposed_for_edits(lambent, tmp_path):
+    """Chrome, which hardly anybody sees, is fixed until a session changes it."""
+    loaded, file = load_scene(str(write_floor(tmp_path))), tmp_path / "chrome.edits.json"
+    chrome = loaded.materials["chrome"].model_copy(update={"kd": (0.1, 0.1, 0.1)})
+    session = Session.new("s", loaded.cameras[0], {"chrome": chrome}, size=(12, 8))
+    for change, fixed in (({}, ["chrome"]), ({"kd": (0.1, 0.2, 0.3)}, [])):
+        session.change("chrome", chrome.model_copy(update=change))
+        session.save(file)
+        asked = lambent("bake", tmp_path / "scene.toml", "--edit", file, *BOUNCED[4:], "--propose", "--json")
+        assert asked.code == 0 and asked.json["proposals"][0]["bounces"]["fixed"] == fixed, asked
 
 
 def test_interreflections_are_proposed_and_baked_as_the_user_wants(lambent, tmp_path):
