@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from numcodecs import Zstd
 
-from lambent.cli.inspect import inspect_store
+import lambent
 from lambent.core.errors import UserError
 from lambent.core.views.camera import Camera, CameraPath
 from lambent.materials.document import Lobe, Material
@@ -106,7 +106,7 @@ def read_all(folder: Path) -> None:
         if reflector.plan is not None:
             plan_of(reflector.plan)
     read_baked(store)
-    json.dumps(inspect_store(str(folder)), default=str)
+    json.dumps(lambent.open(folder).facts(), default=str)
 
 
 @contextmanager
