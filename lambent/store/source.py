@@ -15,6 +15,7 @@ from lambent.core.inputs import sha256_of
 from lambent.scenes import load_scene
 from lambent.scenes.scene import ImageEnvironment, Scene
 from lambent.store.contract import CUTS, SCENE, ObjectRecord, SceneRecord, scene_record
+from lambent.store.kept.session import Surroundings
 from lambent.store.store import Store
 from lambent.store.textures import read_textures
 
@@ -35,6 +36,12 @@ def environment_note(image: ImageEnvironment | None) -> dict[str, Any] | None:
     if image is None:
         return None
     return {**asdict(image), "file": sha256_of(image.file)}
+
+
+def environment_image(store: Store) -> ImageEnvironment | None:
+    """The image that lights a store's views instead of its scene's environment, if any."""
+    said = store.documents.get(SURROUNDINGS)
+    return Surroundings.model_validate(said).image(store.folder) if said else None
 
 
 def changed_inputs(store: Store, scene: Scene) -> list[str]:

@@ -13,13 +13,13 @@ from lambent.core.errors import UserError
 from lambent.core.views.camera import Camera
 from lambent.editing.curves.nodes import Which
 from lambent.editing.session import document
-from lambent.editing.session.document import Surroundings
 from lambent.editing.session.history import History
 from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material, Provenance
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.of_models import same_quotients
 from lambent.scenes.scene import ImageEnvironment
+from lambent.store.kept.session import Surroundings
 from tests.editing.pulled_materials import with_node
 from tests.materials.test_curve_lobes import KD_CURVE, curve_lobe
 

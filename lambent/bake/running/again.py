@@ -72,14 +72,7 @@ def bake_again(
     if LIGHT not in store:
         raise UserError("store has no light map", file=folder, field=LIGHT)
     made_with = store.artefact(LIGHT).meta
-    scene = with_lamp_edits(scene_of(store), lamps)
-    exchanged = {name: Look(scene.materials[name], of) for name, of in (textures or {}).items()}
-    scene = replace(
-        scene,
-        materials={**scene.materials, **materials},
-        textures=textures_in_looks(scene.textures, exchanged),
-        measured={name: file for name, file in scene.measured.items() if name not in materials},
-    )
+    scene = edited_scene(store, materials, textures or {}, lamps)
     _check_parts(store, scene, materials)
     _prepare(store, copy)
     effort, seed = quality or str(made_with.get("quality")), int(made_with.get("seed", 0))
@@ -96,6 +89,27 @@ def bake_again(
         progress=progress,
         watch=watch,
     )
+
+
+def edited_scene(
+    store: Store, materials: Mapping[str, Material], textures: Mapping[str, str | ImageTexture],
+    lamps: Mapping[int, LampEdit],
+) -> Scene:  # fmt: skip
+    """The scene of a store with edits as of `bake_again`; raises `UserError` if the store does not know its scene."""
+    scene = with_lamp_edits(scene_of(store), lamps)
+    exchanged = {name: Look(scene.materials[name], of) for name, of in textures.items()}
+    return replace(
+        scene,
+        materials={**scene.materials, **materials},
+        textures=textures_in_looks(scene.textures, exchanged),
+        measured={name: file for name, file in scene.measured.items() if name not in materials},
+    )
+
+
+def check_copy(store: Store, folder: Path) -> None:
+    """Raise `UserError` if a store in `folder` was not made as a copy of this one."""
+    if (folder / MANIFEST).exists() and Store.open(folder).documents.get(COPY_OF) != store.folder.name:
+        raise UserError("is another store", file=folder, hint="move it: edited materials are baked into this folder")
 
 
 def _check_parts(store: Store, scene: Scene, materials: Mapping[str, Material]) -> None:
@@ -123,8 +137,7 @@ def _check_parts(store: Store, scene: Scene, materials: Mapping[str, Material]) 
 
 def _prepare(store: Store, folder: Path) -> None:
     """Create the copy with the geometry and notes of the store, if it does not exist yet."""
-    if (folder / MANIFEST).exists() and Store.open(folder).documents.get(COPY_OF) != store.folder.name:
-        raise UserError("is another store", file=folder, hint="move it: edited materials are baked into this folder")
+    check_copy(store, folder)
     with Store.create(folder, store.inputs) as copy:
         for name, document in store.documents.items():
             if name not in (TIMINGS, LAST_RUN):

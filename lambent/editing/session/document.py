@@ -15,13 +15,12 @@ from lambent.core.discovery import known
 from lambent.core.errors import UserError, invalid
 from lambent.core.inputs import parse_json, read_bytes
 from lambent.core.strict import Strict
-from lambent.core.surroundings import Axis, Layout
 from lambent.core.views.camera import Camera
 from lambent.materials.document import Material
 from lambent.scenes.sky.triangle_lights import FEWEST, MOST
 from lambent.store.consistency import is_usable
 from lambent.store.kept.session import FORMAT as STORES
-from lambent.store.kept.session import session_from
+from lambent.store.kept.session import Place, Surroundings, session_from
 
 FORMAT: Literal["lambent-edit-session"] = "lambent-edit-session"
 LIMIT_BYTES = 256 << 20
@@ -30,7 +29,6 @@ MOST_MATERIALS = 1000
 MOST_PIXELS = 1 << 26
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
-Place = Annotated[str, Field(min_length=1, max_length=4096, pattern=r"^[^\x00]*$")]
 
 
 class EditedMaterial(Strict):
@@ -38,16 +36,6 @@ class EditedMaterial(Strict):
 
     start: Material
     now: Material
-
-
-class Surroundings(Strict):
-    """An image that lights the scene instead of its own environment; fields as in `scenes.ImageEnvironment`."""
-
-    file: Place
-    scale: Annotated[float, Field(gt=0, le=1e9)] = 1.0
-    rotation_deg: Annotated[float, Field(allow_inf_nan=False)] = 0.0
-    layout: Layout | None = None
-    up: Axis = "+y"
 
 
 class SessionDocument(Strict):

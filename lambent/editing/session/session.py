@@ -21,13 +21,14 @@ from lambent.core.discovery import known
 from lambent.core.errors import invalid
 from lambent.core.files import write_text
 from lambent.core.views.camera import Camera
-from lambent.editing.session.document import EditedMaterial, SessionDocument, Surroundings, load_document
+from lambent.editing.session.document import EditedMaterial, SessionDocument, load_document
 from lambent.editing.session.history import History, Steps
 from lambent.materials.document import Material
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.of_models import same_quotients
 from lambent.materials.factored.terms import Editable
 from lambent.scenes.scene import ImageEnvironment
+from lambent.store.kept.session import Surroundings
 
 
 class Session:
@@ -98,9 +99,7 @@ class Session:
     def environment(self) -> ImageEnvironment | None:
         """The image that lights the scene instead of its own environment."""
         said = self.document.environment
-        if said is None:
-            return None
-        return ImageEnvironment(self.path(said.file).resolve(), **said.model_dump(exclude={"file"}))
+        return None if said is None else said.image(self.folder)
 
     def original(self, material: str) -> Editable:
         """The terms and curves of a material that transport is computed for."""

@@ -21,10 +21,11 @@ from lambent.core.inputs import parse_json, read_bytes
 from lambent.core.light.false_colour import Range
 from lambent.core.light.light_mix import LightMix
 from lambent.core.strict import Strict
+from lambent.core.surroundings import Axis, Layout
 from lambent.core.views.camera import Camera
 from lambent.materials.document import Material
 from lambent.scenes.lamp_edits import LampEdit
-from lambent.scenes.scene import ImageTexture
+from lambent.scenes.scene import ImageEnvironment, ImageTexture
 from lambent.store.consistency import is_usable
 from lambent.store.lock import lock
 
@@ -37,6 +38,7 @@ READABLE = (1, VERSION)
 Stops = Annotated[float, Field(ge=-64, le=64)]
 Length = Annotated[float, Field(gt=0, le=1e9)]
 Pixels = Annotated[int, Field(ge=1, le=1 << 14)]
+Place = Annotated[str, Field(min_length=1, max_length=4096, pattern=r"^[^\x00]*$")]
 
 
 class SessionLock:
@@ -149,6 +151,27 @@ class KeptView(Strict):
         return self
 
 
+class Surroundings(Strict):
+    """An image that lights the scene instead of its own environment; fields as in `scenes.ImageEnvironment`."""
+
+    file: Place
+    scale: Annotated[float, Field(gt=0, le=1e9)] = 1.0
+    rotation_deg: Annotated[float, Field(allow_inf_nan=False)] = 0.0
+    layout: Layout | None = None
+    up: Axis = "+y"
+
+    def image(self, folder: Path) -> ImageEnvironment:
+        """The environment, of a file by a folder."""
+        return ImageEnvironment((folder / self.file).resolve(), **self.model_dump(exclude={"file"}))
+
+
+class RelitSky(Strict):
+    """The light of relit views: the store's environment, or an image by the store's folder, rotated about +y."""
+
+    turn_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
+    environment: Surroundings | None = None
+
+
 class EditedView(Strict):
     """A view whose materials are edited in place: a `lambent.editing` session document, of files by the store's folder.
 
@@ -164,7 +187,7 @@ class EditedView(Strict):
 class WalkSession(Strict):
     """Content of a session file: the current state, the one compared with it, stored states by name, and the view.
 
-    `edited` are views edited in place, by their camera's name.
+    `edited` are views edited in place, by their camera's name; `sky` is that of relit views.
     """
 
     format: Literal["lambent-walk-session"] = FORMAT
@@ -174,6 +197,7 @@ class WalkSession(Strict):
     states: dict[str, RoomState] = Field(default_factory=dict)
     view: KeptView | None = None
     edited: dict[str, EditedView] = Field(default={}, exclude_if=lambda one: not one)
+    sky: RelitSky = Field(default=RelitSky(), exclude_if=lambda one: one == RelitSky())
 
     @property
     def rooms(self) -> list[RoomState]:

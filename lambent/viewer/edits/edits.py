@@ -16,7 +16,7 @@ from lambent.editing.session.history import History
 from lambent.materials.document import Material
 from lambent.scenes.lamp_edits import LampEdit
 from lambent.scenes.scene import ImageTexture
-from lambent.store.kept.session import RoomState, WalkSession
+from lambent.store.kept.session import RelitSky, RoomState, WalkSession
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,7 @@ class _State:
     notes: Mapping[str, Hashable] = field(default_factory=dict)
     tracks: Mapping[str, MixTrack | None] = field(default_factory=dict)  # light along paths that was changed, by path
     views: Mapping[str, SessionDocument] = field(default_factory=dict)  # edited in place, by camera
+    sky: RelitSky = field(default_factory=RelitSky)
 
 
 class MaterialEdits:
@@ -78,7 +79,7 @@ class MaterialEdits:
     @property
     def session(self) -> WalkSession:
         """The whole session to save."""
-        return WalkSession(now=self.room, beside=self.other, states=dict(self.stored))
+        return WalkSession(now=self.room, beside=self.other, states=dict(self.stored), sky=self.sky)
 
     def current(self, name: str) -> Material:
         return self.edited.get(name, self.scene[name])
@@ -97,6 +98,16 @@ class MaterialEdits:
         now = {name: one.now for name, one in view.materials.items()}
         room = self._room(self.room.model_copy(update={"materials": {**self.edited, **now}}))
         self._go_on(room=room, views={**self.views, view.camera.name: view})
+
+    @property
+    def sky(self) -> RelitSky:
+        """The light of relit views."""
+        return self._history.now.sky
+
+    def change_sky(self, **changes: object) -> None:
+        """Change the light of relit views within the present stroke, or begin a stroke."""
+        if (sky := self.sky.model_copy(update=changes)) != self.sky:
+            self._go_on(sky=sky)
 
     def mix(self, light: LightMix) -> None:
         """Change the light mix within the present stroke, or begin a stroke."""
@@ -205,10 +216,12 @@ class MaterialEdits:
         """Take a whole session, as one stroke."""
         self.end_stroke()
         now = self._history.now
-        self._history.change(replace(self._state_of(session), notes=now.notes, tracks=self.tracks, views=now.views))
+        self._history.change(
+            replace(self._state_of(session), notes=now.notes, tracks=self.tracks, views=now.views, sky=now.sky)
+        )
 
     def _state_of(self, session: WalkSession) -> _State:
-        return _State(self._room(session.now), session.beside, session.states)
+        return _State(self._room(session.now), session.beside, session.states, sky=session.sky)
 
     def reset(self, name: str) -> None:
         """Restore the scene's material, as one stroke."""

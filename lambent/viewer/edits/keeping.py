@@ -114,6 +114,7 @@ class SessionKeeper(SessionFile):
             ("the light mix", edits.light != kept.now.light),
             ("stored states", edits.stored != kept.states),
             ("the state to compare with", edits.other != kept.beside),
+            ("the sky of relit views", edits.sky != kept.sky),
         ]
         return (*names, *(what for what, changed in more if changed))
 

@@ -24,7 +24,7 @@ READ_ONLY = (
 CHANGED = "read-only: another window has changed the session; open the store again to go on from there"
 TAKEN = "the other window has closed: this one keeps the session from now on"
 NO_STORE = "there is no store to keep the session in"
-PARTS = ("now", "beside", "states", "edited")  # of a session, without its view
+PARTS = ("now", "beside", "states", "edited", "sky")  # of a session, without its view
 FILES = (FILE, FORMER_BACKUP)
 
 
@@ -116,7 +116,8 @@ class SessionFile:
         """Whether the file is not current. One that is to be renamed stays until an edit replaces it."""
         if self._latest == self._written:
             return False
-        return not self._aside or any(getattr(self._latest, part) != getattr(self.opened, part) for part in PARTS)
+        changed = any(getattr(self._latest, part) != getattr(self.opened, part) for part in PARTS)
+        return changed or not self._aside or self._screen.exchanging  # the next mode goes on from the file
 
     def _ask(self) -> None:
         """Take over from a window that has closed, if it has left the file as this one read it."""

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from lambent.core.errors import UserError
 from lambent.core.plain import plain_name
-from lambent.editing.session.document import Surroundings
 from lambent.materials.document import Material, load_material
+from lambent.store.kept.session import Surroundings
 from lambent.viewer.background.fitting import Fitting
 from lambent.viewer.editor.files import kind_of, typed_path, with_account
 from lambent.viewer.edits.edits import unused

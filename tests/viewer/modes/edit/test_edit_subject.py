@@ -9,10 +9,10 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.pictures.images import write_image
-from lambent.editing.session.document import Surroundings
 from lambent.editing.session.session import Session
 from lambent.materials.document import Material
 from lambent.scenes.scene import ImageEnvironment
+from lambent.store.kept.session import Surroundings
 from lambent.store.source import SURROUNDINGS
 from lambent.store.store import Store
 from lambent.viewer import edit
