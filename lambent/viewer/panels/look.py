@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 from lambent.core.light.exposure import ev100_of
 from lambent.core.light.false_colour import LEAST, MOST, Range
 from lambent.realtime.planar.planar_integrators import CHOICES as PLANARS
+from lambent.viewer.edits.fitted import Fitted
 from lambent.viewer.look import INTEGRATORS, LOOKUPS, MOST_EV, SAMPLE_COUNTS, VIEW_TRANSFORMS, Look
 from lambent.viewer.pacing import BUDGET_S
 from lambent.viewer.panels.widgets import check, choice, explain, press, slider
@@ -25,6 +26,17 @@ def draw(look: Look, screen: Screen) -> None:
         draw_range(look, screen)
     draw_reflections(look, planar=False)
     draw_quality(screen.pace)
+
+
+def draw_fitted(state: Fitted) -> None:
+    """Draw the View panel of a mode with a picture of a fixed size."""
+    look = state.look
+    draw_exposure(look)
+    draw_transform(look)
+    if look.is_false_coloured:
+        draw_range(look, state.screen)
+    meaning = "shows one pixel of the picture as one pixel of the screen, instead of filling the window"
+    state.pixel_exact = check("one pixel of the picture is one of the screen", state.pixel_exact, meaning)
 
 
 def draw_exposure(look: Look, key: str = "") -> None:

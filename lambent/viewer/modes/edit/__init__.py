@@ -25,9 +25,9 @@ def edits(path: Path) -> bool:
 def start(path: Path, name: str, screen: Screen, *, device: Any = None, **options: Any) -> Mode:
     """Start the mode on a scene, a store or a session; options as in `subject.opened`."""
     from lambent.realtime.gpu.device import choose_adapter, open_device
+    from lambent.viewer.edits.shown import backend_of
     from lambent.viewer.modes.edit.drawing import EditDrawing
     from lambent.viewer.modes.edit.mode import EditMode
-    from lambent.viewer.modes.edit.shown import backend_of
     from lambent.viewer.modes.edit.state import EditState
     from lambent.viewer.modes.edit.subject import opened
 

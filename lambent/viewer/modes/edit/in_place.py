@@ -11,10 +11,8 @@ from lambent.core.views.camera import Camera
 from lambent.editing.session.document import SessionDocument, document_from, load_document
 from lambent.editing.session.session import Session, with_materials
 from lambent.materials.document import Material
-from lambent.store.kept.session import FILE, EditedView, KeptView, WalkSession
+from lambent.store.kept.session import FILE, EditedView, WalkSession
 from lambent.viewer.edits.edits import MaterialEdits
-from lambent.viewer.edits.keeping import SessionKeeper
-from lambent.viewer.look import Look
 
 
 def kept_view(opened: WalkSession, camera: Camera, place: Path, edits: MaterialEdits) -> SessionDocument | None:
@@ -60,45 +58,6 @@ def former_view(camera: Camera, place: Path, like: Path) -> tuple[SessionDocumen
         except UserError as error:
             lines.append(f"not taken into the store's session: {error}")
     return None, lines
-
-
-class RoomsView:
-    """The view of a room's session while it is edited in place: its exposure, view transform, and way back.
-
-    Sets the `look` to the session's.
-    """
-
-    def __init__(self, keeper: SessionKeeper, look: Look) -> None:
-        self.opened, self._look = keeper.opened.view, look
-        self._left: dict[str, object] = {}
-        if self.opened is not None:
-            look.view_transform, look.scale = self.opened.look.view_transform, self.opened.look.scale
-        if self.has_exposure and self.opened is not None and self.opened.look.exposure_ev is not None:
-            look.exposure_ev, look.base_ev = self.opened.look.exposure_ev, self.opened.look.base_ev
-        keeper.view = self.now
-
-    @property
-    def has_exposure(self) -> bool:
-        """Whether the session has an exposure."""
-        return self.opened is not None and self.opened.look.exposure_ev is not None
-
-    @property
-    def selected(self) -> str | None:
-        """The selected object."""
-        return None if self.opened is None else self.opened.selected
-
-    def leave(self, camera: Camera, selected: str | None) -> None:
-        """Let the room be shown from a camera, with an object selected."""
-        self._left = {"camera": camera, "selected": selected}
-
-    def now(self) -> KeptView | None:
-        """The view to keep."""
-        if self.opened is None:
-            return KeptView.model_validate(self._left) if self._left else None
-        look = self._look
-        shown: dict[str, object] = {"view_transform": look.view_transform, "scale": look.scale}
-        shown |= {"exposure_ev": look.exposure_ev, "base_ev": look.base_ev} if self.has_exposure else {}
-        return self.opened.model_copy(update={"look": self.opened.look.model_copy(update=shown), **self._left})
 
 
 def _place(camera: object) -> object:

@@ -16,6 +16,7 @@ from lambent.viewer.mode import Drawing, Mode, Panel, Textures
 from lambent.viewer.modes.edit import panels
 from lambent.viewer.modes.edit.bounced_panel import draw_interreflections
 from lambent.viewer.modes.edit.state import OUTLINED_S, EditState
+from lambent.viewer.panels import look as looks
 from lambent.viewer.panels import overlay
 from lambent.viewer.panels.curves import CurvesPanel
 from lambent.viewer.panels.widgets import rows, shadowed
@@ -148,7 +149,7 @@ def columns(state: EditState) -> tuple[Panel, ...]:
         ),
         Panel("Curves", curves.draw, "pull the curves of the material", opened=True),
         Panel("Numbers", panels.Numbers(state).draw, "every parameter of the material"),
-        Panel("View", partial(panels.draw_look, state), "exposure and view transform", opened=True),
+        Panel("View", partial(looks.draw_fitted, state), "exposure and view transform", opened=True),
         Panel(
             "Compare", partial(panels.draw_compare, state), "the picture compared with an earlier state", opened=True
         ),

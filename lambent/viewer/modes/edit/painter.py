@@ -23,7 +23,7 @@ from lambent.editing.picture import EditedPicture, Part, TransportNeeded
 from lambent.materials.factored.of_models import same_quotients
 from lambent.materials.factored.terms import Editable
 from lambent.realtime.edited.commands import OutOfGpuMemory
-from lambent.viewer.modes.edit.shown import Backend, Fading, OnHost, Shown, faded
+from lambent.viewer.edits.shown import Backend, Fading, OnHost, Shown, faded
 
 FADE_S = 0.5
 FRAME_S = 0.05  # time after which a frame that was not taken is replaced

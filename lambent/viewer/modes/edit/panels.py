@@ -8,7 +8,6 @@ from imgui_bundle import imgui
 
 from lambent.viewer.edits.keeping import SessionKeeper
 from lambent.viewer.modes.edit.state import OFF, EditState
-from lambent.viewer.panels import look as looks
 from lambent.viewer.panels import parameters
 from lambent.viewer.panels.widgets import (
     AMBER,
@@ -132,17 +131,6 @@ def draw_compare(state: EditState) -> None:
         imgui.same_line()
         if press("fit scale", "fits the colour range to the differences, without the largest half per cent"):
             compared.scale = None
-
-
-def draw_look(state: EditState) -> None:
-    """Draw exposure, view transform and size."""
-    look = state.look
-    looks.draw_exposure(look)
-    looks.draw_transform(look)
-    if look.is_false_coloured:
-        looks.draw_range(look, state.screen)
-    meaning = "shows one pixel of the picture as one pixel of the screen, instead of filling the window"
-    state.pixel_exact = check("one pixel of the picture is one of the screen", state.pixel_exact, meaning)
 
 
 def draw_files(state: EditState) -> None:

@@ -17,16 +17,16 @@ from lambent.materials.document import Material
 from lambent.materials.factored.terms import Editable
 from lambent.store.source import changed_inputs
 from lambent.store.store import MANIFEST, Store
+from lambent.viewer.edits.rooms_view import RoomsView
+from lambent.viewer.edits.shown import Backend
 from lambent.viewer.exchange import EDIT, WALK, exchanged
 from lambent.viewer.look import Look
 from lambent.viewer.mode import Divider
 from lambent.viewer.modes.edit.baking import LIGHTS, Baking
 from lambent.viewer.modes.edit.files import Files
-from lambent.viewer.modes.edit.in_place import RoomsView
 from lambent.viewer.modes.edit.interreflections import SHOWN, Bounced
 from lambent.viewer.modes.edit.loading import Loading, ViewMap
 from lambent.viewer.modes.edit.painter import Frame, Materials, Painter, Wish, checked
-from lambent.viewer.modes.edit.shown import Backend
 from lambent.viewer.modes.edit.subject import Subject
 from lambent.viewer.screen import Screen
 
@@ -108,6 +108,16 @@ class EditState:
         self.compared = Compared(kept={UNEDITED: self._originals()})
         if (subject.store / MANIFEST).exists():
             self._load(None)
+
+    @property
+    def name(self) -> str:
+        """Name of the scene."""
+        return self.subject.name
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the picture in pixels."""
+        return self.session.document.size
 
     @property
     def busy(self) -> bool:

@@ -13,10 +13,10 @@ from lambent.materials.factored.of_lobes import of_material
 from lambent.realtime.gpu.device import AdapterInfo
 from lambent.realtime.gpu.targets import pixels
 from lambent.viewer.edits import edited
+from lambent.viewer.edits.shown import OnGpu, OnHost, backend_of
 from lambent.viewer.modes.edit import painter
 from lambent.viewer.modes.edit.drawing import EditDrawing
 from lambent.viewer.modes.edit.painter import Painter, Wish, checked
-from lambent.viewer.modes.edit.shown import OnGpu, OnHost, backend_of
 from lambent.viewer.screen import Rect
 from tests.editing.test_frozen_pictures import DIFFUSE, SIZE, START, dark_parts, expected, light
 from tests.viewer import waiting

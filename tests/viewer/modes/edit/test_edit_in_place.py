@@ -13,10 +13,10 @@ from lambent.store.kept.session import write_session as write
 from lambent.store.store import Store
 from lambent.viewer.edits.edits import MaterialEdits
 from lambent.viewer.edits.keeping import SessionKeeper
+from lambent.viewer.edits.rooms_view import RoomsView
 from lambent.viewer.edits.session_file import READ_ONLY
 from lambent.viewer.look import Look
 from lambent.viewer.modes.edit.files import Files
-from lambent.viewer.modes.edit.in_place import RoomsView
 from lambent.viewer.modes.edit.subject import opened
 from lambent.viewer.screen import Rect, Screen
 from tests.viewer.conftest import Clock

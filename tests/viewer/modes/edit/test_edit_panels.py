@@ -100,7 +100,7 @@ def test_the_picture_keeps_its_shape(driver):
     from lambent.viewer.modes.edit.drawing import EditDrawing
 
     drawing = EditDrawing.__new__(EditDrawing)  # without a device
-    drawing._state, drawing._ratio = driver.state, 2.0
+    drawing._fitted, drawing._ratio = driver.state, 2.0
     assert drawing.within(Rect(0, 0, 80, 80)) == Rect(0, 10, 80, 60)
     assert drawing.within(Rect(10, 0, 160, 60)) == Rect(50, 0, 80, 60)
     driver.state.pixel_exact = True

@@ -19,10 +19,10 @@ from lambent.editing.session.session import Session
 from lambent.editing.stored import parts_of
 from lambent.materials.document import Material, load_material
 from lambent.store.store import Store
+from lambent.viewer.edits.tone import _half_bits, _table, displayed
 from lambent.viewer.modes.edit import painter
 from lambent.viewer.modes.edit.painter import FADE_S
 from lambent.viewer.modes.edit.state import DIRECT, OFF, UNEDITED
-from lambent.viewer.modes.edit.tone import _half_bits, _table, displayed
 from tests.viewer.edited_view import LIGHTS, OTHER_TRAY, SHOWN, TRAY, WALL, new_state, pull, settled, tint, until
 from tests.viewer.editor.measured_specimens import write_measurement
 

@@ -14,7 +14,7 @@ from lambent.editing.canvas import HostCanvas
 from lambent.realtime.edited.display import Display
 from lambent.realtime.gpu.targets import DISPLAY_FORMAT, pixels, target_texture
 from lambent.viewer.edits.edited import ShadedCanvas, sums
-from lambent.viewer.modes.edit.tone import Bytes, difference, displayed
+from lambent.viewer.edits.tone import Bytes, difference, displayed
 
 Look = tuple[str, float, Range]  # view transform, exposure in EV, scale of false colours
 Fading = tuple[Image, float]  # a difference added to a picture, and its remaining share
