@@ -126,7 +126,7 @@ def same_python():
 
 def install_package(for_tests):
     say("installing Lambent and what it needs (about 1 GB; a few minutes the first time)")
-    what = f"{HOME}[test]" if for_tests else str(HOME)
+    what = f"{HOME}[{'test' if for_tests else 'all'}]"
     pip = [PYTHON, "-m", "pip", "install", "--disable-pip-version-check", "--no-input"]
     pip += [] if sys.stderr.isatty() else ["--quiet"]
     call([*pip, "-c", HOME / "constraints.txt", "-e", what], "installation failed; is there a network connection?")

@@ -174,9 +174,11 @@ def dependencies() -> tuple[dict[str, str], dict[str, str]]:
     module_of = {"pillow": "PIL", "colour-science": "colour"}
 
     def modules(names: list[str]) -> dict[str, str]:
-        return {name: module_of.get(name, name.replace("-", "_")) for name in names}
+        own = [name for name in names if not name.startswith("lambent[")]
+        return {name: module_of.get(name, name.replace("-", "_")) for name in own}
 
-    return modules(project["dependencies"] + optional["cluster"]), modules(optional["test"])
+    parts = (optional[extra] for extra in ("bake", "walk", "cluster"))
+    return modules(project["dependencies"] + [name for part in parts for name in part]), modules(optional["test"])
 
 
 def third_party(paths: list[Path]) -> set[str]:

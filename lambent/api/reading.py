@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from lambent.api.stores import Store
     from lambent.api.tables import Reconstruction, Table
 
+BUILTIN = "builtin:"
 HEAD_BYTES = 1 << 16  # a Mitsuba scene identifies itself within these
 PICTURES = (b"v/1\x01", b"#?RADIANCE", b"#?RGBE", b"\x89PNG", b"\xff\xd8\xff")
 Kind = Literal["scene", "store", "picture", "material", "luminaire", "table"]
@@ -79,17 +80,21 @@ def open(folder: str | Path) -> Store:
 def kind_of(file: str | Path) -> Kind:
     """What a file is, by its path and its first bytes; `UserError` if it cannot be read."""
     from lambent.materials.document import is_document
-    from lambent.scenes.loaders.load import BUILTIN_PREFIX, is_scene
-    from lambent.scenes.photometry.files import is_luminaire
+    from lambent.materials.measured.registry import claims
 
     path = Path(file)
-    if str(file).startswith(BUILTIN_PREFIX):
+    if str(file).startswith(BUILTIN):
         return "scene"
     if path.is_dir():
         return "store"
     head = read_head(path, HEAD_BYTES)
     if head.startswith(PICTURES):
         return "picture"
+    if claims(head, path):  # asked before the loaders of scenes, which take a second to import
+        return "table"
+    from lambent.scenes.loaders.load import is_scene
+    from lambent.scenes.photometry.files import is_luminaire
+
     if is_scene(path, head):
         return "scene"
     if is_document(head):

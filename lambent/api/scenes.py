@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from lambent.api.describing import variants_in_words
 from lambent.api.materials import Material
 from lambent.api.progress import Wanted, progress_of
+from lambent.core.extras import needing_extras
 from lambent.core.views.camera import Camera
 from lambent.scenes import load_scene
 from lambent.scenes.scene import Scene as Contents
@@ -91,9 +92,10 @@ class Scene:
             Finished work stays in the folder.
         """
         from lambent.api.stores import Store
-        from lambent.bake.bake import bake
 
-        with progress_of(progress) as bar:
+        with needing_extras(), progress_of(progress) as bar:
+            from lambent.bake.bake import bake
+
             bake(self.contents, Path(folder), quality=quality, progress=bar, **options).close()
         return Store(folder)
 

@@ -13,6 +13,7 @@ from lambent.api.pictures import Picture
 from lambent.api.progress import Wanted, progress_of
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
+from lambent.core.extras import needing_extras
 from lambent.core.light.light_mix import MixTrack, parse_light
 from lambent.core.views.camera import Camera
 from lambent.scenes.looks.variants import variant_named
@@ -126,9 +127,10 @@ class Store:
         said = self._settings(
             size, light, variant, integrator=integrator, exposure_ev=exposure_ev, view=view, **settings
         )
-        drawn = self._images(said, edits or {}, note)
+        with needing_extras():
+            drawn = self._images(said, edits or {}, note)
         where = view_of(opened_with_views(self.arrays)[1], camera)
-        with progress_of(progress) as bar:
+        with needing_extras(), progress_of(progress) as bar:
             radiance = drawn.radiance(where, bar)
         details = {"integrator": drawn.settings.integrator, "samples": drawn.samples, "noise": drawn.noise}
         return Picture(radiance, drawn.exposed(radiance), view, details=details)
@@ -143,7 +145,7 @@ class Store:
         """
         from lambent.render import film
 
-        with progress_of(progress) as bar:
+        with needing_extras(), progress_of(progress) as bar:
             return film(
                 self.arrays, file, path, self._settings(size, light, variant, **settings), fps=fps, progress=bar
             )
@@ -155,7 +157,7 @@ class Store:
         """Write a contact sheet of all variants (.png); parameters and errors as of `render`."""
         from lambent.render import sheet
 
-        with progress_of(progress) as bar:
+        with needing_extras(), progress_of(progress) as bar:
             return sheet(self.arrays, file, camera, self._settings(size, None, "", **settings), progress=bar)
 
     def illuminance(
@@ -203,7 +205,7 @@ class Store:
         if over is not None:
             wanted = GridSection(name=over, object=over, height_m=height_m, spacing_m=spacing_m, margin_m=margin_m)
         settings, state = self._settings((1, 1), light, variant), variant or (light if isinstance(light, str) else "")
-        with progress_of(progress) as bar:
+        with needing_extras(), progress_of(progress) as bar:
             return illuminated(
                 self.arrays, settings, wanted, state or "as baked", error, maintenance, lambda text: None, bar
             )

@@ -58,7 +58,6 @@ def build_app() -> typer.Typer:
     app = typer.Typer(
         name="lambent",
         help="Measured materials where they will live: fit, place, bake, walk.",
-        add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
         context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
@@ -75,6 +74,7 @@ def run(arguments: list[str]) -> int:
 
     from lambent.cli.console import log_to_stderr
     from lambent.core.errors import UserError
+    from lambent.core.extras import missing
     from lambent.core.progress import Cancelled
 
     log_to_stderr()
@@ -101,6 +101,8 @@ def run(arguments: list[str]) -> int:
             return _fail(f"{error.filename or 'output'}: cannot be written ({error.strerror})")
         if is_interruption(error):
             code = INTERRUPTED
+        elif isinstance(error, ModuleNotFoundError) and (said := missing(error)) is not None:
+            return _fail(str(said))
         elif isinstance(error, MemoryError) or (isinstance(error, ImportError) and NO_ROOM in str(error)):
             return _fail(MEMORY)
         else:

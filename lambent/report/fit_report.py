@@ -11,6 +11,7 @@ import numpy as np
 
 from lambent.core.arrays import Flags, Floats
 from lambent.core.errors import UserError
+from lambent.core.extras import needing_extras
 from lambent.core.inputs import sha256_of
 from lambent.core.pictures.images import to_bytes
 from lambent.core.progress import Progress, silent
@@ -122,9 +123,10 @@ def _previews(
 ) -> list[str]:
     """The two preview balls and their difference, or the reason why they are missing."""
     try:
-        from lambent.bake.engine import engine
+        with needing_extras():
+            from lambent.bake.engine import engine
 
-        engine()
+            engine()
     except UserError as error:
         return [page.note("No previews", [f"The measurement and the model are not shown on a ball: {error}"])]
     from lambent.bake.reference.material_preview import DAYLIGHT, preview

@@ -114,6 +114,14 @@ def is_known(path: Path | str) -> bool:
     return _reader_of(*_head(path), path) is not None
 
 
+def claims(head: bytes, path: Path) -> bool:
+    """Whether some reader recognises a file that begins with `head`, without a fault."""
+    try:
+        return _reader_of(head, path.stat().st_size, path) is not None
+    except UserError:
+        return False
+
+
 def _head(path: Path) -> tuple[bytes, int]:
     """The first bytes of a file and its size; raises `UserError` if it cannot be read."""
     with open_input(path) as file:

@@ -11,7 +11,9 @@ import numpy as np
 
 from lambent.core.arrays import Flags, Floats
 from lambent.core.light.colour import RGB_TO_XYZ, WHITE_XYZ, XYZ_TO_RGB, luminance, xyz_to_rgb
+from lambent.core.light.observer import observer
 
+LONGEST_NM = 780.0  # of a reflectance
 _WHITE_Y = WHITE_XYZ / WHITE_XYZ[1]
 
 
@@ -52,12 +54,9 @@ def rgb_of_spectra(wavelengths_nm: Floats) -> Floats:
     ----------
     wavelengths_nm : (K,) increasing
     """
-    from colour import MSDS_CMFS, SDS_ILLUMINANTS
-
-    observer, d65 = MSDS_CMFS["CIE 1931 2 Degree Standard Observer"], SDS_ILLUMINANTS["D65"]
-    fine_nm = np.arange(360.0, 781.0)
-    cmf = np.stack([np.interp(fine_nm, observer.wavelengths, column) for column in observer.values.T])
-    power = np.interp(fine_nm, d65.wavelengths, d65.values)
+    visible = observer().wavelengths_nm <= LONGEST_NM
+    fine_nm, power = observer().wavelengths_nm[visible], observer().d65[visible]
+    cmf = observer().matching[visible].T
     hats = np.stack([np.interp(fine_nm, wavelengths_nm, unit) for unit in np.eye(len(wavelengths_nm))])
     xyz = (cmf * power) @ hats.T / (cmf[1] * power).sum()
     rgb = XYZ_TO_RGB @ xyz

@@ -15,6 +15,7 @@ from lambent.core.errors import UserError
 from lambent.core.geometry.directions import Floats
 from lambent.core.inputs import read_bytes
 from lambent.core.light.colour import XYZ_TO_RGB, srgb_decode
+from lambent.core.light.observer import observer
 from lambent.scenes.loaders.mitsuba.document import Document, Element
 
 Y_INTEGRAL_NM = 106.856895  # of the CIE 1931 luminosity function, as Mitsuba normalises emission
@@ -111,11 +112,8 @@ def _spectrum(element: Element, text: str, pairs: Sequence[Sequence[str | float]
 
 def _observer() -> tuple[Floats, Floats]:
     """Wavelengths (K,) in nm, and the XYZ (K, 3) of a unit value at each."""
-    from colour import MSDS_CMFS
-
-    observer = MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
-    nm = np.asarray(observer.wavelengths, float)
-    return nm, np.asarray(observer.values) * (nm[1] - nm[0]) / Y_INTEGRAL_NM
+    nm = observer().wavelengths_nm
+    return nm, observer().matching * (nm[1] - nm[0]) / Y_INTEGRAL_NM
 
 
 def _blackbody(element: Element) -> Floats:
