@@ -1,13 +1,15 @@
-"""`lambent relight`: a still of a view that was baked for relighting, under a turned or another environment."""
+"""`lambent relight`: a view under a turned or another environment, in the window or as a still."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lambent.cli.console import Force, Json, show
+from lambent.cli.console import Force, Json, parse_size, show
+from lambent.cli.walk import SIZE, Size
 from lambent.core.errors import UserError
 from lambent.core.surroundings import Axis, Layout
 
@@ -17,8 +19,10 @@ if TYPE_CHECKING:
 
 
 def command(
-    store: Annotated[Path, typer.Argument(help="Folder of a store with a view baked for relighting.")],
-    output: Annotated[Path, typer.Option("-o", help="Image to write (.exr, .hdr, .png).")],
+    store: Annotated[Path, typer.Argument(help="Folder of a store; for -o, with a view baked for relighting.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", help="Image to write (.exr, .hdr, .png). [default: open the window]")
+    ] = None,
     camera: Annotated[str | None, typer.Option(help="Camera by name. [default: the first]")] = None,
     environment: Annotated[
         Path | None, typer.Option(help="Picture that lights the scene. [default: the scene's own environment]")
@@ -26,15 +30,28 @@ def command(
     layout: Annotated[Layout | None, typer.Option(help="Layout of the picture. [default: recognised]")] = None,
     up: Annotated[Axis, typer.Option(help="World axis of the picture's up direction.")] = "+y",
     scale: Annotated[float, typer.Option(min=0.0, help="Factor on the picture's radiance.")] = 1.0,
-    turn: Annotated[float, typer.Option(help="Rotation of the environment about +y, degrees.")] = 0.0,
+    turn: Annotated[
+        float | None, typer.Option(help="Rotation of the environment about +y, degrees. [default: 0, or the session's]")
+    ] = None,
     exposure: Annotated[float | None, typer.Option(help="Exposure of a PNG, in EV. [default: metered]")] = None,
     force: Force = False,
     json: Json = False,
+    size: Size = SIZE,
 ) -> None:
-    """Draw a view under a turned or another environment: direct light with shadows, original materials.
+    """Show a view under a turned or another environment: direct light with shadows.
+
+    In the window, materials are as edited in the room; with -o, as baked.
 
     Example: lambent relight room.store --environment grace.hdr --turn 90 -o grace.png
     """
+    if turn is not None and not math.isfinite(turn):
+        raise UserError("is no angle", field="--turn", got=turn, expected="degrees")
+    if output is None:
+        for name, given in (("exposure", exposure is not None), ("force", force), ("json", json)):
+            if given:
+                raise UserError("is for a picture", field=f"--{name}", hint="name it with -o")
+        _show(store, camera, environment, {"layout": layout, "up": up, "scale": scale}, turn, size)
+        return
     from lambent.core.light.colour import shown
     from lambent.core.light.exposure import metered
     from lambent.core.outputs import check_output
@@ -49,7 +66,7 @@ def command(
     view = RelitView(opened, record.camera, record.width, record.height)
     if environment is not None:
         view.light(ImageEnvironment(environment, scale, 0.0, layout, up))
-    view.turn(turn)
+    view.turn(turn or 0.0)
     view.draw()
     image = view.image()
     if output.suffix.lower() == ".png":
@@ -60,6 +77,19 @@ def command(
     facts = {"written": output, "camera": record.camera.name, "size": [record.width, record.height]}
     text = f"{output}: {record.width}x{record.height}, camera {record.camera.name}, left out {100 * view.error:.2g} %"
     show({**facts, "left_out": view.error}, text, json)
+
+
+def _show(
+    store: Path, camera: str | None, environment: Path | None, how: dict[str, object], turn_deg: float | None, size: str
+) -> None:
+    """Open the window; what is wrong is said without a display, too."""
+    pixels = parse_size(size)
+    from lambent.viewer import app
+    from lambent.viewer.modes.relight import check
+
+    light = None if environment is None else {"path": environment, **how}
+    check(store, camera, light)
+    app.run(store, "relight", size=pixels, camera=camera, environment=light, turn_deg=turn_deg)
 
 
 def _chosen(store: Store, camera: str | None) -> ViewRecord:

@@ -1,4 +1,4 @@
-"""Exchanges the mode of a window: the room on foot for one of its views, edited in place, and back.
+"""Exchanges the mode of a window: the room on foot for one of its views, edited in place or relit, and back.
 
 Everything goes by the store's session, which the mode before has written when the next one opens it.
 """
@@ -12,7 +12,7 @@ from lambent.core.errors import UserError
 from lambent.viewer import app
 from lambent.viewer.mode import Mode
 
-WALK, EDIT = "walk", "edit"
+WALK, EDIT, RELIGHT = "walk", "edit", "relight"
 
 
 def exchanged(mode: Mode, store: Path, before: str, name: str, **options: Any) -> Mode:

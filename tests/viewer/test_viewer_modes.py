@@ -72,7 +72,7 @@ def toys(tmp_path, monkeypatch):
 
 
 def test_modes_are_found(toys, tmp_path):
-    assert list(app.starts()) == ["edit", "material", "toy", "walk", "view"]
+    assert list(app.starts()) == ["edit", "material", "relight", "toy", "walk", "view"]
     assert edit.editing_mode(tmp_path / "train.toy") == "toy"
     assert edit.editing_mode(tmp_path / "brass.json") == edit.editing_mode(tmp_path / "missing.bsdf") == "material"
     with pytest.raises(UserError, match=r"unknown mode.*toy"):

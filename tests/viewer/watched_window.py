@@ -21,6 +21,7 @@ from lambent.core.files import write_text
 from lambent.viewer import app, edit, modes, window
 from lambent.viewer.modes.edit import state as edit_state
 from lambent.viewer.modes.edit.state import EditState
+from lambent.viewer.modes.relight.state import RelightState
 from lambent.viewer.modes.walk.pictures import Pictures
 from tests.viewer.panel_driver import recording
 
@@ -91,6 +92,8 @@ def seen_of(state):
     """Of a mode that has a camera and materials."""
     if isinstance(state, EditState):
         return seen_in_place(state)
+    if isinstance(state, RelightState):
+        return seen_relit(state)
     materials = getattr(state, "materials", None)
     editor = materials.editor if materials else state.editor
     edits = materials.edits if materials else editor.subject.edits
@@ -120,6 +123,19 @@ def seen_in_place(state):
         "number": frame.number if frame is not None else 0,
         "brightness": float(frame.radiance.mean()) if frame is not None else 0.0,
         "compared": frame is not None and frame.compared is not None,
+    }
+
+
+def seen_relit(state):
+    frame, sky = state.frame, state.edits.sky
+    return {
+        "relit": state.is_settled,
+        "said": state.said,
+        "turn_deg": sky.turn_deg,
+        "sky": sky.environment.file if sky.environment is not None else None,
+        "camera": asdict(state.view.camera),
+        "brightness": float(frame.shown.radiance.mean()) if frame is not None else 0.0,
+        "frame_s": frame.seconds if frame is not None else 0.0,
     }
 
 

@@ -25,6 +25,12 @@ from lambent.store.source import environment_image
 from lambent.store.store import MANIFEST, Store
 
 
+def relight_copy(folder: Path) -> Path:
+    """Path of the store of edited views: ROOM.relight.store beside ROOM.store."""
+    folder = folder.resolve()
+    return folder.with_name(f"{folder.name.removesuffix('.store')}.relight.store")
+
+
 @dataclass(frozen=True)
 class Relit:
     """A view of the store in `folder`, of its room as edited; the mix of light groups does not count."""
@@ -36,10 +42,8 @@ class Relit:
     @property
     def place(self) -> Path:
         """Folder of the store that has, or will have, the view."""
-        folder = self.folder.resolve()
-        if self.room.model_copy(update={"light": LightMix()}) == RoomState():
-            return folder
-        return folder.with_name(f"{folder.name.removesuffix('.store')}.relight.store")
+        as_baked = self.room.model_copy(update={"light": LightMix()}) == RoomState()
+        return self.folder.resolve() if as_baked else relight_copy(self.folder)
 
     def scene(self) -> Scene:
         """The edited scene; raises `UserError` if the store does not know its scene."""

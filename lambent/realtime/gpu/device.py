@@ -52,6 +52,7 @@ WEBGPU_LIMITS: Mapping[str, int] = {
 }
 BACKENDS = ("Vulkan", "Metal", "DX12")
 BLOCKS = "texture-compression-bc"
+OF_ROOMS = ("max-buffer-size", "max-texture-dimension-2d", "max-storage-buffer-binding-size")
 OPTIONAL_FEATURES = ("timestamp-query", BLOCKS)
 
 
@@ -136,3 +137,9 @@ def open_device(needs: Mapping[str, int] | None = None) -> Any:
         limits[name] = max(limits.get(name, 0), value)
     features = [name for name in OPTIONAL_FEATURES if name in adapter.features]
     return adapter.request_device_sync(required_limits=limits, required_features=features)
+
+
+def open_room_device() -> Any:
+    """A device that serves any room: with the adapter's own limits where rooms need more than is usual."""
+    limits = choose_adapter().limits
+    return open_device({name: limits[name] for name in OF_ROOMS})

@@ -11,8 +11,6 @@ from lambent.viewer.screen import Screen
 check = check_there  # before a window is opened
 STARTS = ("edit",)
 NO_DISPLAY = "editing in place needs a display; without one, use `lambent.editing` from Python (docs/editing.md)"
-# Limits of a device that rooms need more of than is usual.
-OF_ROOM = ("max-buffer-size", "max-texture-dimension-2d", "max-storage-buffer-binding-size")
 
 
 def edits(path: Path) -> bool:
@@ -24,7 +22,7 @@ def edits(path: Path) -> bool:
 
 def start(path: Path, name: str, screen: Screen, *, device: Any = None, **options: Any) -> Mode:
     """Start the mode on a scene, a store or a session; options as in `subject.opened`."""
-    from lambent.realtime.gpu.device import choose_adapter, open_device
+    from lambent.realtime.gpu.device import open_room_device
     from lambent.viewer.edits.shown import backend_of
     from lambent.viewer.modes.edit.drawing import EditDrawing
     from lambent.viewer.modes.edit.mode import EditMode
@@ -32,7 +30,6 @@ def start(path: Path, name: str, screen: Screen, *, device: Any = None, **option
     from lambent.viewer.modes.edit.subject import opened
 
     subject = opened(path, screen, **options)
-    if device is None:  # which serves the whole room, too
-        device = open_device({name: choose_adapter().limits[name] for name in OF_ROOM})
+    device = device or open_room_device()
     state = EditState(subject, screen, backend=backend_of(device))
     return EditMode(state, EditDrawing(device, state))

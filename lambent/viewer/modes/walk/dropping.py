@@ -9,11 +9,12 @@ from lambent.scenes.photometry.files import ENDINGS as LUMINAIRES
 from lambent.viewer.editor.files import ENVIRONMENTS, kind_of
 from lambent.viewer.modes.walk.input import WalkInput
 from lambent.viewer.modes.walk.session.finishes import Finish, Finishes
+from lambent.viewer.modes.walk.session.leaving import can_leave, relight_view
 from lambent.viewer.modes.walk.session.texturing import ENDINGS as IMAGES
 from lambent.viewer.modes.walk.state import WalkState
 
 NO_LAMPS = "this room has no lamps to exchange: `lambent bake` finds those of IES and EULUMDAT files"
-SKY = "the sky is baked: name it as the scene's environment and bake again, or see `lambent relight`"
+SKY = "the sky is baked: name it as the scene's environment and bake again"
 NOTHING = "drop it onto an object, or select one first"
 
 
@@ -24,7 +25,10 @@ def drop(path: str, state: WalkState, input: WalkInput, finishes: Finishes) -> N
         _onto_lamp(path, state, input)
         return
     if input.is_over_sky and file.suffix.lower() in ENVIRONMENTS:
-        say(f"{file.name} is not shown: {SKY}")
+        if can_leave(state):
+            relight_view(state, file)
+        else:
+            say(f"{file.name} is not shown: {SKY}")
         return
     input.select_under_cursor()
     name = state.selection.material

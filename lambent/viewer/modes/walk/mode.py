@@ -50,7 +50,7 @@ from lambent.viewer.modes.walk.panels import (
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.session.finishes import Finishes
 from lambent.viewer.modes.walk.session.kept_view import restore
-from lambent.viewer.modes.walk.session.leaving import edit_view
+from lambent.viewer.modes.walk.session.leaving import can_leave, edit_view
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.panels import card, overlay, statistics
 from lambent.viewer.panels.curves import CurvesPanel
@@ -214,7 +214,7 @@ def panels(state: WalkState, falling: FallingLight | None, finishes: Finishes, f
     """Panels of the column, sorted into the sizes of the window."""
     light_on_it = partial(metering.draw_falling, falling, state)
     edits = state.materials.edits
-    edit, can_edit = partial(edit_view, state), lambda: state.session.keeps and state.rebaking.possible
+    edit, can_edit = partial(edit_view, state), partial(can_leave, state)
     curves = CurvesPanel(lambda: state.selection.material, edits, edits.change, state.screen, fitting, edit, can_edit)
     of_lamps = SizedPanel("Lamps", partial(lamps.draw, state.lamps), "move, aim and exchange a lamp of the scene")
     return (

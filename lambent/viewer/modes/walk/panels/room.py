@@ -6,7 +6,7 @@ from functools import partial
 
 from imgui_bundle import imgui
 
-from lambent.viewer.modes.walk.session.leaving import edit_view
+from lambent.viewer.modes.walk.session.leaving import can_leave, edit_view, relight_view
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.panels.widgets import buttons, check, status, wrapped
 
@@ -22,8 +22,10 @@ def draw(state: WalkState) -> None:
     buttons([
         ("undo", edits.can_undo, edits.undo, "undoes the last change of a material or the light (Ctrl+Z)"),
         ("redo", edits.can_redo, edits.redo, "redoes the change (Ctrl+Shift+Z)"),
-        ("edit this view", session.keeps and state.rebaking.possible, partial(edit_view, state),
+        ("edit this view", can_leave(state), partial(edit_view, state),
          "pulls the curves of the materials in this view, under exact direct light"),
+        ("relight this view", can_leave(state), partial(relight_view, state),
+         "turns the sky of this view, or exchanges it: direct light with shadows"),
     ])  # fmt: skip
     if session.fault:
         wrapped([session.fault])
