@@ -105,7 +105,8 @@ class EditState:
         self._document: SessionDocument | None = None
         self._now: dict[str, Editable] = {}
         self._wish = Wish()
-        self.compared = Compared(kept={UNEDITED: self._originals()})
+        names = self.session.document.materials
+        self.compared = Compared(kept={UNEDITED: {name: self.session.editable(name) for name in names}})
         if (subject.store / MANIFEST).exists():
             self._load(None)
 

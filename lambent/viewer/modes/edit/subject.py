@@ -125,43 +125,33 @@ def opened(
     UserError
         If the path cannot be read, the camera is unknown, or the store belongs to another scene.
     """
-    if picture is not None and max(picture) > LARGEST_PX:
-        got = f"{picture[0]}x{picture[1]}"
-        raise UserError("picture is too large", field="--picture", got=got, expected=f"at most {LARGEST_PX} a side")
-    if environment is not None and not environment.is_file():
-        raise UserError("file does not exist", file=environment, field="--environment")
-    kind = kind_of(path)
-    session = Session.open(path) if kind == "session" else None
-    place = str(path)
-    if session is not None:
-        place = str(session.path(session.document.scene))
-        place = place if Path(place).exists() else session.document.scene
-        crease_deg = session.document.crease_deg if crease_deg is None else crease_deg
+    _check(picture, environment)
+    place, session = _session_at(path)
+    if session is not None and crease_deg is None:
+        crease_deg = session.document.crease_deg
     base = Path(place) if Path(place).is_dir() else None
     scene = _scene_at(place, crease_deg)
-    edits = MaterialEdits(scene.materials)
-    keeper = SessionKeeper(edits, base, screen, soon_s) if kind == "store" else None
+    edits, kept = MaterialEdits(scene.materials), _kept_environment(base)
+    keeper = SessionKeeper(edits, base, screen, soon_s) if kind_of(path) == "store" else None
+    lit_by = Surroundings(file=str(environment.resolve())) if environment is not None else kept
     try:
-        lines = [] if keeper is None else list(keeper.open(None))
-        kept = _kept_environment(base)
-        lit_by = Surroundings(file=str(environment.resolve())) if environment is not None else kept
-        document, folder = (None, Path()) if session is None else (session.document, session.folder)
+        lines: tuple[str, ...] = ()
+        document = None if session is None else session.document
         if keeper is not None and base is not None:
-            where, folder = camera_named(scene, base, camera), base
-            document, more = _of_room(keeper, where, base, edits, screen.folder / plain_name(scene.name, "scene"))
-            lines += more
-        changes: dict[str, object] = {"crease_deg": crease_deg}
+            like = screen.folder / plain_name(scene.name, "scene")
+            document, lines = _of_room(keeper, camera_named(scene, base, camera), base, edits, like)
         if document is None:
-            begun = with_materials(_begun(place, scene, base, camera_named(scene, base, camera)), edits.edited)
-            size = picture or of_aspect(*(fitting or SIZE))
-            document = begun.model_copy(update={"size": size, "environment": lit_by})
+            begun = _begun(place, scene, base, camera_named(scene, base, camera))
+            changes: dict[str, object] = {"size": picture or of_aspect(*(fitting or SIZE)), "environment": lit_by}
+            changes["materials"] = with_materials(begun, edits.edited).materials
         else:
-            changes |= _changes(document, scene, base, camera, picture)
+            begun, changes = document, _changes(document, scene, base, camera, picture)
             changes |= {} if environment is None else {"environment": lit_by}
-        document = document.model_copy(update=changes)
+        document = begun.model_copy(update={**changes, "crease_deg": crease_deg})
         if keeper is None:
             edits.begin_from(WalkSession(now=RoomState(materials={n: m.now for n, m in document.materials.items()})))
-        lit_by = document.environment
+        folder = session.folder if session is not None else Path() if keeper is None else base or Path()
+        now, lit_by = Session(ViewSteps(edits, document), folder), document.environment
         own = base if base is not None and lit_by == kept else None
         chosen = store or own or default_store(screen.folder, scene.name, lit_by, folder)
         check_store(chosen, place)
@@ -169,23 +159,39 @@ def opened(
         if keeper is not None:
             keeper.close()
         raise
-    now = Session(ViewSteps(edits, document), folder)
-    home = path if kind == "session" else None
-    return Subject(now, edits, scene, screen.folder, chosen, lit_by, home, keeper, tuple(lines))
+    return Subject(now, edits, scene, screen.folder, chosen, lit_by, path if session else None, keeper, lines)
+
+
+def _check(picture: tuple[int, int] | None, environment: Path | None) -> None:
+    if picture is not None and max(picture) > LARGEST_PX:
+        got = f"{picture[0]}x{picture[1]}"
+        raise UserError("picture is too large", field="--picture", got=got, expected=f"at most {LARGEST_PX} a side")
+    if environment is not None and not environment.is_file():
+        raise UserError("file does not exist", file=environment, field="--environment")
+
+
+def _session_at(path: Path) -> tuple[str, Session | None]:
+    """The scene's place, and the session if the path is one."""
+    if kind_of(path) != "session":
+        return str(path), None
+    session = Session.open(path)
+    place = session.path(session.document.scene)
+    return (str(place) if place.exists() else session.document.scene), session
 
 
 def _of_room(
     keeper: SessionKeeper, camera: Camera, base: Path, edits: MaterialEdits, like: Path
-) -> tuple[SessionDocument | None, list[str]]:
+) -> tuple[SessionDocument | None, tuple[str, ...]]:
     """The view of a store's session, or else once of a former file, and lines on what it does not show as the room."""
+    lines = keeper.open(None)
     now = keeper.opened.now
     parts = {"light mix": now.light.groups, "lamps": now.lamps, "textures": now.textures}
     other = [what for what, changed in parts.items() if changed]
-    lines = [f"shown as baked here: the room's {', '.join(other)}"] if other else []
+    lines += (f"shown as baked here: the room's {', '.join(other)}",) if other else ()
     if (found := kept_view(keeper.opened, camera, base, edits)) is not None:
         return found, lines
     found, more = former_view(camera, base, like)
-    return found, lines + more
+    return found, (*lines, *more)
 
 
 def _begun(place: str, scene: Scene, base: Path | None, camera: Camera) -> SessionDocument:
