@@ -129,7 +129,7 @@ def seen_in_place(state):
 def seen_relit(state):
     frame, sky = state.frame, state.edits.sky
     return {
-        "relit": state.is_settled,
+        "relit": state.is_current and not state.busy,
         "said": state.said,
         "turn_deg": sky.turn_deg,
         "sky": sky.environment.file if sky.environment is not None else None,

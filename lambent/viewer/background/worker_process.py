@@ -55,7 +55,7 @@ class WorkerProcess:
         self._work = pending(self._work)
         return self._work is not None
 
-    def ask(self, said: Mapping[str, Any]) -> bool:
+    def ask(self, said: Mapping[str, Any] | Sequence[Any]) -> bool:
         """Send a line; return False if the process has ended."""
         assert self._process.stdin is not None
         try:

@@ -19,7 +19,7 @@ from lambent.editing.session.session import Session
 from lambent.viewer.background.worker_process import WorkerProcess
 
 LIGHTS = (400, 4000)
-WORKER, BOUNCES = "lambent.viewer.modes.edit.worker", "--bounces"
+WORKER, BOUNCES, RELIGHT = "lambent.viewer.modes.edit.worker", "--bounces", "--relight"
 ONE_CURVE, TWO_CURVES = 0.6, 12.0  # time of transport for a whole view, relative to the time of visibility
 LEAST_DONE = 0.02  # least share done before the remaining time is estimated
 _NUMBER = re.compile(r"(\d+) lights$")

@@ -1,8 +1,9 @@
-"""Worker process that bakes the transport of a session's view, and reports progress on stdout.
+"""Worker process that bakes a session's view for editing, or a room's for relighting, and reports progress on stdout.
 
 python -m lambent.viewer.modes.edit.worker SESSION STORE LIGHTS...
 python -m lambent.viewer.modes.edit.worker SESSION STORE --bounces JSON
 python -m lambent.viewer.modes.edit.worker SESSION STORE --bounces JSON KEPT  (proposes materials to edit beside KEPT)
+python -m lambent.viewer.modes.edit.worker STORE --relight  (stdin: [a `RoomState`, a `ViewRecord`] as JSON)
 
 Every line is a JSON object: "what", "done" and "total" of a step; "lights", a number of lights with complete transport;
 "samples", the present samples of all interreflections; "proposal"; or "error", a line for the user.
@@ -22,9 +23,11 @@ from lambent.core.errors import UserError
 from lambent.editing.interreflection.noise import PASS, PassNoise
 from lambent.editing.session.session import Session
 from lambent.scenes.scene import Scene
+from lambent.store.contract import ViewRecord
+from lambent.store.kept.session import RoomState
 from lambent.store.source import SURROUNDINGS
 from lambent.store.store import Store
-from lambent.viewer.modes.edit.baking import BOUNCES
+from lambent.viewer.modes.edit.baking import BOUNCES, RELIGHT
 from lambent.viewer.modes.edit.subject import scene_for
 
 NICENESS = 10  # the window has priority
@@ -80,6 +83,15 @@ def bounce(session: Path, folder: Path, bounces: Bounces, kept: Collection[str] 
         watch.note(store)
 
 
+def relight(folder: Path, room: object, view: object) -> None:
+    """Bake a view of a store's room for relighting."""
+    from lambent.bake.running.relit import Relit
+    from lambent.bake.transport.view import View
+
+    of = ViewRecord.model_validate(view)
+    Relit(folder, RoomState.model_validate(room), View(of.camera, of.width, of.height)).bake(_progress)
+
+
 def _own(session: Session, scene: Scene) -> set[str]:
     """Materials that differ from the scene's."""
     materials = session.document.materials.items()
@@ -111,7 +123,9 @@ if __name__ == "__main__":
     if hasattr(os, "nice"):
         os.nice(NICENESS)
     try:
-        if sys.argv[3:4] == [BOUNCES]:
+        if sys.argv[2:] == [RELIGHT]:
+            relight(Path(sys.argv[1]), *json.loads(sys.stdin.readline()))
+        elif sys.argv[3:4] == [BOUNCES]:
             bounces, *kept = map(json.loads, sys.argv[4:])
             bounce(Path(sys.argv[1]), Path(sys.argv[2]), Bounces.of(bounces), kept[0] if kept else None)
         else:

@@ -33,5 +33,5 @@ def start(path: Path, name: str, screen: Screen, *, device: Any = None, **option
     from lambent.viewer.modes.relight.state import RelightState
 
     device = device or open_room_device()
-    state = RelightState(Store.open(path), screen, backend=backend_of(device), **options)
+    state = RelightState(Store.open(path), screen, backend_of(device), **options)
     return RelightMode(state, RelightDrawing(device, state))

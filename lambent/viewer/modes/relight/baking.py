@@ -8,42 +8,24 @@ from typing import Any
 
 from lambent.bake.interreflection.proposal import time_said
 from lambent.bake.running.relit import Relit
+from lambent.store.contract import VIEW
 from lambent.viewer.background.worker_process import WorkerProcess
-
-WORKER = "lambent.viewer.modes.relight.worker"
-LEAST_DONE = 0.02  # least share done before the remaining time is estimated
+from lambent.viewer.modes.edit.baking import LEAST_DONE, RELIGHT, WORKER
 
 
-class ViewBake:
-    """One run of the worker; `wake` is called as it goes on."""
+class ViewBake(WorkerProcess):
+    """One run of the worker; `line` is its present step and the remaining time."""
 
     def __init__(self, relit: Relit, wake: Callable[[], None]) -> None:
-        self._what, self._share, self._began_s = "starting", 0.0, time.monotonic()
-        self._process = WorkerProcess(
-            WORKER, [str(relit.folder)], "the bake", lambda said, _: self._take(said), ends=True, wake=wake
+        self.line, self._what, self._began_s = "this view is being baked for relighting", "", 0.0
+        super().__init__(
+            WORKER, [str(relit.folder), RELIGHT], "the bake", lambda said, _: self._report(said), ends=True, wake=wake
         )
-        self._process.ask({"room": relit.room.model_dump(mode="json"), **relit.view.meta})
-        self.close = self._process.close
+        self.ask([relit.room.model_dump(mode="json"), relit.view.meta[VIEW]])
 
-    @property
-    def running(self) -> bool:
-        """Whether the worker runs; handles its end."""
-        return self._process.running
-
-    @property
-    def error(self) -> str:
-        """Reason of a failure, in one line; else empty."""
-        return self._process.error
-
-    @property
-    def line(self) -> str:
-        """The present step and the remaining time."""
-        said = f"this view is being baked for relighting: {self._what} {100 * self._share:.0f} %"
-        if not LEAST_DONE <= self._share < 1:
-            return said
-        return f"{said}, about {time_said((time.monotonic() - self._began_s) * (1 / self._share - 1))}"
-
-    def _take(self, said: Mapping[str, Any]) -> None:
+    def _report(self, said: Mapping[str, Any]) -> None:
+        now_s, done = time.monotonic(), said["done"] / max(said["total"], 1e-9)
         if said["what"] != self._what:
-            self._what, self._began_s = said["what"], time.monotonic()
-        self._share = float(said["done"]) / max(float(said["total"]), 1e-9)
+            self._what, self._began_s = said["what"], now_s
+        left = f", about {time_said((now_s - self._began_s) * (1 / done - 1))}" if LEAST_DONE <= done < 1 else ""
+        self.line = f"this view is being baked for relighting: {self._what} {100 * done:.0f} %{left}"

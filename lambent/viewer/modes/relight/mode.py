@@ -82,7 +82,7 @@ class RelightMode(Mode):
     def draw_over(self, textures: Textures) -> None:
         if self.state.scale is not None:
             overlay.scale_bar_of(self.screen.picture, self.state.scale, LUMINANCE.unit)
-        overlay.draw(self.screen, list(self.state.said))
+        overlay.draw(self.screen, self.state.said)
         if not imgui.is_any_item_active() and not self.input.dragging:
             self.state.edits.end_stroke()
 
@@ -112,7 +112,7 @@ def draw_head(state: RelightState) -> None:
         ("redo", edits.can_redo, edits.redo, "redoes the step (Ctrl+Shift+Z)"),
         ("walk from here", state.keeper.keeps, state.enter_room, meaning),
     ])  # fmt: skip
-    wrapped(list(dict.fromkeys((*state.lines, *state.not_shown))))
+    wrapped(list(dict.fromkeys((*state.lines, *state.said))))
 
 
 def draw_sky(state: RelightState) -> None:
@@ -126,16 +126,17 @@ def draw_sky(state: RelightState) -> None:
     meaning = "lights the view with this image; you can also drop it onto the window"
     if (text := typed_field("sky", state.typed, "light", "an .hdr or .exr, any layout...", meaning)) is not None:
         state.open(text)
-    buttons([("as baked", sky.environment is not None, state.light_as_baked, "lights the view with the scene's sky")])
+    buttons(
+        [("as baked", sky.environment is not None, partial(state.light, None), "lights the view with the scene's sky")]
+    )
 
 
 def draw_scene(state: RelightState) -> None:
     """Draw what the picture is of."""
     width, height = state.size
     image = state.edits.sky.environment
-    left_out = "" if state.left_out is None else f"{100 * state.left_out:.2g} %"
     rows(
         [("camera", state.view.camera.name), ("picture", f"{width} x {height}"),
          ("sky", "the scene's" if image is None else image.file.rpartition("/")[2]),
-         ("light", "direct, with shadows"), ("left out", left_out)], "scene"
+         ("light", "direct, with shadows")], "scene"
     )  # fmt: skip

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from lambent.bake.running.relit import Relit
@@ -25,23 +24,23 @@ from lambent.viewer.editor.files import typed_path
 from lambent.viewer.edits.edits import MaterialEdits
 from lambent.viewer.edits.keeping import SessionKeeper
 from lambent.viewer.edits.rooms_view import RoomsView
-from lambent.viewer.edits.shown import Backend, OnHost, Shown
+from lambent.viewer.edits.shown import Backend, Look, Shown
 from lambent.viewer.exchange import RELIGHT, WALK, exchanged
-from lambent.viewer.look import Look
+from lambent.viewer.look import Look as Settings
 from lambent.viewer.modes.relight.baking import ViewBake
 from lambent.viewer.modes.relight.view import cameras_of, sky_of, view_of
 from lambent.viewer.screen import Screen
 
-Wish = tuple[RelitSky, str, float, Range]  # the sky, view transform, exposure, scale of false colours
 NO_SKY = "this scene has no sky to turn: drop a .hdr or .exr to light it with"
 
 
 @dataclass(frozen=True)
 class Frame:
-    """A picture, and the view and the wish that it shows."""
+    """A picture, and the view, sky and look that it shows."""
 
     view: RelitView
-    wish: Wish
+    sky: RelitSky
+    look: Look
     shown: Shown
     seconds: float
 
@@ -50,7 +49,7 @@ class Frame:
 class Found:
     """A view, None where it is not baked; whether its scene has a sky, and a line for the user."""
 
-    view: RelitView | None
+    view: RelitView | None = None
     has_sky: bool = True
     line: str = ""
 
@@ -63,9 +62,9 @@ class RelightState:
     camera
         Name of a camera of the scene, or of a saved or baked view; by default the session's, or the first.
     environment, turn_deg
-        The sky to start with, in place of the session's: arguments of `light_with`, and degrees.
+        The sky to start with, in place of the session's: arguments of `view.sky_of`, and degrees.
     fitting
-        Size with the aspect of a view that is not baked yet.
+        Size with the aspect of a view whose bake has not begun.
 
     Attributes
     ----------
@@ -76,16 +75,17 @@ class RelightState:
     """
 
     def __init__(
-        self, store: Store, screen: Screen, *, camera: str | None = None, environment: dict[str, Any] | None = None,
-        turn_deg: float | None = None, fitting: tuple[int, int] | None = None, backend: Backend | None = None,
-        bake: Callable[[Relit, Callable[[], None]], ViewBake] = ViewBake,
+        self, store: Store, screen: Screen, backend: Backend, *, camera: str | None = None,
+        environment: dict[str, Any] | None = None, turn_deg: float | None = None,
+        fitting: tuple[int, int] | None = None,
     ) -> None:  # fmt: skip
         self.folder, self.screen, record, cameras = store.folder, screen, scene_record(store), cameras_of(store)
         chosen = None if camera is None else cameras[known("camera", camera, cameras, field="--camera")]
+        sky = None if environment is None else sky_of(**environment, folder=store.folder)
         self.name, self.bounds, self.edits = record.name, record.bounds, MaterialEdits(record.materials)
         self.keeper = SessionKeeper(self.edits, store.folder, screen)
         self.lines = self.keeper.open(None)
-        self.look = Look(exposure_ev=record.exposure_ev or 0.0, shows=("full",))
+        self.look = Settings(exposure_ev=record.exposure_ev or 0.0, shows=("full",))
         self.room = RoomsView(self.keeper, self.look)
         self._metered = record.exposure_ev is not None or self.room.has_exposure
         left = None if self.room.opened is None else cameras.get(self.room.opened.camera.name)
@@ -93,16 +93,16 @@ class RelightState:
         self.pixel_exact, self.trouble, self.typed = False, "", dict[str, str]()
         self.frame: Frame | None = None
         self.baking: ViewBake | None = None
-        self._backend, self._bake = backend or OnHost(), bake
+        self._backend = backend
         self._work: Work | None = None
         self._room: RoomState | None = None  # of the last search
         self._relit = Relit(self.folder, RoomState(), self.view)  # what is searched for, or baked
         self._searches = self._was_baked = False  # whether a search is due, and whether it is the one after a bake
-        self._found = Found(None)
+        self._found = Found()
         self._refused: tuple[Surroundings | None, str] = None, ""  # an image that cannot be read, and why
         self._lit: tuple[RelitView, RelitSky, Image] | None = None  # the last radiance
-        if environment is not None:
-            self.light_with(**environment)
+        if sky is not None:
+            self.edits.change_sky(environment=sky)
         if turn_deg is not None:
             self.turn(turn_deg)
         self.edits.end_stroke()
@@ -128,49 +128,27 @@ class RelightState:
         return self._work is not None or self.baking is not None
 
     @property
-    def is_settled(self) -> bool:
-        """Whether the picture is there, and shows what is wanted."""
-        return not self.busy and self.frame is not None and self._is_current(self.frame)
-
-    @property
-    def left_out(self) -> float | None:
-        """Share of the view's light that is left out; None before it is there."""
-        return None if self._found.view is None else self._found.view.error
-
-    @property
-    def not_shown(self) -> tuple[str, ...]:
-        """A line on the room's mix of light groups, which this view does not have."""
-        return ("shown as baked here: the room's light mix",) if self.edits.light != LightMix() else ()
-
-    @property
-    def said(self) -> tuple[str, ...]:
+    def said(self) -> list[str]:
         """Lines on what is not shown as wanted, and on background work."""
         doing = "looking for this view" if self._work is not None and self._found.view is None else ""
-        doing = doing if self.baking is None else self.baking.line
-        sky = "" if self.has_sky else NO_SKY
-        lines = (self.keeper.fault, self.trouble, self._found.line, self._refusal, sky, doing)
-        return tuple(filter(None, lines))
+        doing, sky = doing if self.baking is None else self.baking.line, "" if self.has_sky else NO_SKY
+        mix = "shown as baked here: the room's light mix" if self.edits.light != LightMix() else ""
+        lines = (self.keeper.fault, self.trouble, self._found.line, self._refusal, sky, mix, doing)
+        return [line for line in lines if line]
 
     def turn(self, turn_deg: float) -> None:
         """Rotate the sky about +y, from that of the bake or as the image is, within a stroke."""
         self.edits.change_sky(turn_deg=(turn_deg + 180) % 360 - 180)
 
     def open(self, text: str) -> None:
-        """Light the view with a typed or dropped file, or say why not."""
+        """Light the view with a typed or dropped image, as one step, or say why not."""
         try:
-            self.light_with(typed_path(text))
+            self.light(sky_of(typed_path(text), self.folder))
         except UserError as error:
             self.screen.say(f"not loaded: {error}")
 
-    def light_with(self, path: Path, **how: Any) -> None:
-        """Light the view with an image, as one step; `how` as of `view.sky_of`, with its errors."""
-        self._step(sky_of(path, self.folder, **how))
-
-    def light_as_baked(self) -> None:
-        """Light the view with the sky of the bake again, as one step."""
-        self._step(None)
-
-    def _step(self, environment: Surroundings | None) -> None:
+    def light(self, environment: Surroundings | None) -> None:
+        """Light the view with an image, None for the sky of the bake, as one step."""
         self.edits.end_stroke()
         self.edits.change_sky(environment=environment)
         self.edits.end_stroke()
@@ -185,7 +163,11 @@ class RelightState:
         self.keeper.tick()
         self._work = pending(self._work)
         if self.edits.room is not self._room:
-            self._want(self.edits.room)
+            first, self._room = self._room is None, self.edits.room
+            relit = replace(self._relit, room=self._room.model_copy(update={"light": LightMix()}))
+            if first or relit != self._relit:
+                self.stop_baking()
+                self._relit, self._searches, self._was_baked, self.trouble = relit, True, False, ""
         if self._work is None:
             self._go_on()
 
@@ -194,7 +176,6 @@ class RelightState:
         self.stop_baking()
         if self._work is not None:
             self._work.wait()
-            self._work = None
         self.keeper.close()
 
     def stop_baking(self) -> None:
@@ -203,70 +184,65 @@ class RelightState:
             self.baking.close()
             self.baking = None
 
-    def _want(self, room: RoomState) -> None:
-        """Show the view of a room, in light as baked."""
-        first, self._room = self._room is None, room
-        relit = Relit(self.folder, room.model_copy(update={"light": LightMix()}), self.view)
-        if first or relit != self._relit:
-            self.stop_baking()
-            self._relit, self._searches, self._was_baked, self.trouble = relit, True, False, ""
-
     def _go_on(self) -> None:
         """Search for the view, bake it, or draw it."""
         if self._searches:
             self._searches = False
-            self._begin(partial(_found, self._relit), partial(self._take, self._relit), self._not_baked)
+            self._begin(partial(_find, self._relit), partial(self._take, self._relit), self._fail)
         elif self.baking is not None and not self.baking.running:
             error = self.baking.error
             self.stop_baking()
             self._searches, self._was_baked, self.trouble = not error, True, f"not baked: {error}" if error else ""
-        elif (view := self._found.view) is not None and not (self.frame is not None and self._is_current(self.frame)):
-            self._begin(partial(self._drawn, view, self._wish), self._show, self._refuse)
+        elif (view := self._found.view) is not None and not self.is_current:
+            self._begin(partial(self._draw, view, self._sky, self._look), self._show, self._refuse)
 
     def _begin(self, run: Callable[[], Any], done: Callable[[Any], None], failed: Callable[[UserError], None]) -> None:
         self._work = Work(lambda _: run(), done, failed, self.screen.wake)
 
     def _take(self, relit: Relit, found: Found) -> None:
-        """Show what was found, or bake it."""
-        if relit is not self._relit:  # the room has changed since
+        """Show what was found, or bake it, unless the room has changed since."""
+        if relit is not self._relit:
             return
-        self._found = found if found.view is not None else replace(self._found, has_sky=found.has_sky)
-        if found.view is None and self._was_baked:
-            self.trouble = "not baked: the scene has changed meanwhile"
+        if found.view is None and not self._was_baked:
+            self.baking = ViewBake(relit, self.screen.wake)
         elif found.view is None:
-            self.baking = self._bake(relit, self.screen.wake)
+            self.trouble = "not baked: the scene has changed meanwhile"
+        self._found = replace(found, view=found.view or self._found.view)
 
-    def _not_baked(self, error: UserError) -> None:
+    def _fail(self, error: UserError) -> None:
         self.trouble = f"not baked: {error}"
 
     @property
     def _refusal(self) -> str:
         """Why the wanted image is not shown; empty if it may be."""
-        environment, why = self._refused
-        return why if environment == self.edits.sky.environment else ""
+        return self._refused[1] if self._refused[0] == self.edits.sky.environment else ""
 
     @property
-    def _wish(self) -> Wish:
-        sky, look = self.edits.sky, self.look
-        sky = sky.model_copy(update={"environment": None}) if self._refusal else sky
-        return sky, look.view_transform, look.exposure_ev, look.scale
+    def _sky(self) -> RelitSky:
+        sky = self.edits.sky
+        return sky.model_copy(update={"environment": None}) if self._refusal else sky
 
-    def _is_current(self, frame: Frame) -> bool:
-        return frame.view is self._found.view and frame.wish == self._wish
+    @property
+    def _look(self) -> Look:
+        return self.look.view_transform, self.look.exposure_ev, self.look.scale
 
-    def _drawn(self, view: RelitView, wish: Wish) -> Frame:
-        """The picture of a wish; runs in the thread."""
-        began_s, sky = time.perf_counter(), wish[0]
-        before, self._lit = self._lit, None
-        if before is None or before[0] is not view or before[1] != sky:
-            if before is None or before[0] is not view or before[1].environment != sky.environment:
+    @property
+    def is_current(self) -> bool:
+        """Whether the picture shows what is wanted."""
+        frame, wanted = self.frame, (self._found.view, self._sky, self._look)
+        return frame is not None and (frame.view, frame.sky, frame.look) == wanted
+
+    def _draw(self, view: RelitView, sky: RelitSky, look: Look) -> Frame:
+        """Sum and show the picture; runs in the thread."""
+        began_s, lit, self._lit = time.perf_counter(), self._lit, None
+        if lit is None or lit[:2] != (view, sky):
+            if lit is None or (lit[0], lit[1].environment) != (view, sky.environment):
                 view.light(None if sky.environment is None else sky.environment.image(self.folder))
             view.turn(sky.turn_deg)
             view.draw()
-            before = view, sky, view.image()
-        self._lit = before
-        shown = self._backend.still(before[2], (wish[1], wish[2], wish[3]))
-        return Frame(view, wish, shown, time.perf_counter() - began_s)
+            lit = view, sky, view.image()
+        self._lit = lit
+        return Frame(view, sky, look, self._backend.still(lit[2], look), time.perf_counter() - began_s)
 
     def _show(self, frame: Frame) -> None:
         self.frame = frame
@@ -280,7 +256,7 @@ class RelightState:
         self._refused = self.edits.sky.environment, f"shown under its own sky: {error}"
 
 
-def _found(relit: Relit) -> Found:
+def _find(relit: Relit) -> Found:
     """The view, if it is baked. That of a store that does not know its scene is shown as it was baked."""
     view = relit.view
     try:
@@ -291,7 +267,6 @@ def _found(relit: Relit) -> Found:
         except UserError:
             raise error from None
         return Found(there, line=f"materials and light as baked: {error}")
-    has_sky = scene.environment is not None
-    if not relit.is_baked(scene):
-        return Found(None, has_sky)
-    return Found(RelitView(Store.open(relit.place), view.camera, view.width, view.height), has_sky)
+    baked = relit.is_baked(scene)
+    found = RelitView(Store.open(relit.place), view.camera, view.width, view.height) if baked else None
+    return Found(found, scene.environment is not None)

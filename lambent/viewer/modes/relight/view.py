@@ -13,7 +13,7 @@ from lambent.bake.transport.view import View
 from lambent.core.errors import UserError, invalid
 from lambent.core.views.camera import Camera, overview
 from lambent.editing.relit_view import views_for_relighting
-from lambent.store.contract import baked_views, scene_record, view_artefact_name, view_key
+from lambent.store.contract import baked_views, scene_record, view_key
 from lambent.store.kept.session import Surroundings
 from lambent.store.kept.views import read_views
 from lambent.store.store import MANIFEST, Store
@@ -29,21 +29,22 @@ def cameras_of(store: Store) -> dict[str, Camera]:
 
 
 def view_of(store: Store, camera: Camera, fitting: tuple[int, int] | None) -> View:
-    """The view at a camera, in the largest size that it is baked in for relighting, or the aspect of `fitting`."""
-    copy = relight_copy(store.folder)
-    sizes = [
-        size
-        for one in (store, *([Store.open(copy)] if (copy / MANIFEST).exists() else []))
-        for size in _sizes(one, camera)
-    ]
+    """The view at a camera, in the largest size whose bake for relighting has begun, or the aspect of `fitting`."""
+    copy, sizes = relight_copy(store.folder), list[tuple[int, int]]()
+    for one in (store, *([Store.open(copy)] if (copy / MANIFEST).exists() else [])):
+        begun = {artefact.name.split("/")[1] for artefact in one.artefacts("relighting")}
+        views = (view for key, view in baked_views(one).items() if key in begun)
+        at = view_key(camera)
+        sizes += [(view.width, view.height) for view in views if view_key(view.camera) == at]
     return View(camera, *max(sizes, key=lambda size: size[0] * size[1], default=of_aspect(*(fitting or SIZE))))
 
 
 def sky_of(path: Path, folder: Path, **how: Any) -> Surroundings:
     """An image as a sky, by the folder of its store; `how` are further fields of `Surroundings`."""
-    if path.suffix.lower() not in ENVIRONMENTS or not path.is_file():
-        what = "file does not exist" if path.suffix.lower() in ENVIRONMENTS else "is no sky"
-        raise UserError(what, file=path, expected="an .hdr or .exr")
+    if not path.is_file():
+        raise UserError("file does not exist", file=path)
+    if path.suffix.lower() not in ENVIRONMENTS:
+        raise UserError("is no sky", file=path, expected="an .hdr or .exr")
     try:
         file = Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
     except ValueError:  # another drive on Windows
@@ -52,13 +53,3 @@ def sky_of(path: Path, folder: Path, **how: Any) -> Surroundings:
         return Surroundings(file=file, **how)
     except ValidationError as error:
         raise invalid(error, path) from error
-
-
-def _sizes(store: Store, camera: Camera) -> list[tuple[int, int]]:
-    """Sizes in which a store has the view for relighting, finished or not."""
-    there = {one.name for one in store.artefacts("relighting")}
-    return [
-        (one.width, one.height) for key, one in baked_views(store).items()
-        if key == view_key(camera, one.width, one.height)
-        and view_artefact_name(camera, one.width, one.height, "relighting", "spans") in there
-    ]  # fmt: skip

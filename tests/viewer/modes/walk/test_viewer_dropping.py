@@ -89,6 +89,16 @@ def test_a_sky_is_baked_and_over_an_object_the_picture_is_its_texture(mode, stat
     assert "is the texture of brass" in drop(mode, tmp_path / name, TABLE)
 
 
+def test_a_sky_lights_the_view_where_it_can_be_relit(mode, state, tmp_path):
+    write_image(tmp_path / "sky.hdr", np.ones((4, 8, 3), np.float32))
+    state.session.open()
+    state.rebaking.possible = True
+    drop(mode, tmp_path / "sky.hdr", SKY)
+    asked = state.screen.enter.keywords
+    assert asked["name"] == "relight" and asked["environment"] == {"path": tmp_path / "sky.hdr"}
+    state.session.close()
+
+
 def test_the_sky_behind_clear_glass_is_the_sky(mode, state):
     state.meter.cursor = 0.5, 0.6  # on the table, from which the ray reaches the floor
     edits, lobe = state.materials.edits, Lobe(side="transmission", mx=0.001, my=0.001, r0=0.04)

@@ -2,16 +2,19 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.light.light_mix import GroupMix, LightMix
-from lambent.store.kept.session import FILE, read_session
+from lambent.core.pictures.images import write_image
+from lambent.store.kept.session import FILE, RelitSky, read_session
 from lambent.store.kept.views import read_views
 from lambent.viewer.modes.edit import start
 from lambent.viewer.modes.edit.mode import EditMode
+from lambent.viewer.modes.relight.mode import RelightMode
 from lambent.viewer.modes.walk.mode import WalkMode, open_store
-from lambent.viewer.modes.walk.session.leaving import edit_view
+from lambent.viewer.modes.walk.session.leaving import edit_view, relight_view
 from tests.viewer.drawn_frames import drawn
 from tests.viewer.edited_view import pull
 
@@ -88,6 +91,52 @@ def test_a_window_that_began_with_a_view_enters_the_room(adapter, mode, baked_bo
     drawn(back.drawing, back.state, (32, 24))
     assert isinstance(back, WalkMode) and back.drawing._a.read().mean() > 0
     assert back.state.navigation.camera.name == "front"
+
+
+def test_a_view_is_relit_and_left(mode, baked_box, monkeypatch, tmp_path):
+    monkeypatch.setattr("lambent.viewer.modes.relight.state.ViewBake", lambda *_: Bake())
+    write_image(tmp_path / "sky.exr", np.ones((4, 8, 3), np.float32))
+    relight_view(mode[0].state, tmp_path / "sky.exr")
+    view = enter(mode)
+    assert isinstance(view, RelightMode) and view.drawing.device is mode[0].drawing.device
+    state = view.state
+    assert state.edits.sky.environment.file.endswith("sky.exr") and state.look.exposure_ev == -1.0
+    assert state.view.camera == read_views(baked_box).cameras[0] and state.edits.current("red").kd == BLUE
+    assert state.size[0] / state.size[1] == pytest.approx(4 / 3, rel=0.01)
+    state.turn(30.0)
+    state.look.expose(-2.0)
+    state.enter_room()
+    back = enter(mode)
+    assert isinstance(back, WalkMode) and back.state.navigation.camera == state.view.camera
+    assert back.state.selection.name == "left" and back.state.look.exposure_ev == -2.0
+    edits = back.state.materials.edits
+    for sky in (("sky.exr", 30.0), ("sky.exr", 0.0)):
+        assert edits.sky.environment.file.endswith(sky[0]) and edits.sky.turn_deg == sky[1]
+        edits.undo()
+    assert edits.sky == RelitSky() and edits.current("red").kd == BLUE
+    edits.undo()
+    assert "red" not in edits.edited and not edits.can_undo, "one history"
+
+
+class Bake:
+    """A bake that takes for ever."""
+
+    running, line, error = True, "baking by hand", ""
+
+    def close(self):
+        self.running = False
+
+
+def test_a_room_that_is_shown_afresh_stays_fresh_in_its_views(mode, baked_box, screen):
+    mode[0].drawing.close()
+    mode[0].close()
+    before = (baked_box / FILE).read_bytes()
+    mode.append(open_store(baked_box, "walk", screen, fresh=True))
+    edit_view(mode[-1].state)
+    assert enter(mode).state.subject.edits.edited == {}, "as it was left"
+    kept = baked_box / "session-kept-001.json"
+    assert kept.read_bytes() == before and "red" in read_session(kept).now.materials
+    kept.unlink()
 
 
 def test_a_view_that_cannot_be_edited_leaves_the_window_in_the_room(mode, monkeypatch):
