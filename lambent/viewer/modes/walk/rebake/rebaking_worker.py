@@ -12,7 +12,9 @@ its bytes, n H W 3 half floats and H W flags; or "baked", when everything is com
 from __future__ import annotations
 
 import json
+import os
 import sys
+import threading
 from collections.abc import Collection
 from pathlib import Path
 from typing import BinaryIO
@@ -26,8 +28,8 @@ from lambent.core.arrays import Flags
 from lambent.core.errors import UserError
 from lambent.store.kept.images import with_paths
 from lambent.store.kept.session import RoomState
-from lambent.viewer.background.serving import serve
 
+NICENESS = 10  # the window has priority
 REGION_PAUSE = 10.0  # pause after sending a region, in multiples of the sending time
 
 
@@ -76,5 +78,20 @@ def main(store: Path, copy: Path, asked: bytes, out: BinaryIO) -> None:
         watch.say(baked=True)
 
 
+def _end_with(stream: BinaryIO) -> None:
+    """End the process when the window has ended; stopping at any moment leaves the store valid."""
+    while stream.read(1):
+        pass
+    os._exit(0)
+
+
 if __name__ == "__main__":
-    serve(lambda asked, out: main(Path(sys.argv[1]), Path(sys.argv[2]), asked, out))
+    if hasattr(os, "nice"):
+        os.nice(NICENESS)
+    own = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # libraries' output must not mix with the lines
+    words = os.fdopen(os.dup(0), "rb", buffering=0)
+    first = words.readline()
+    if first:
+        threading.Thread(target=_end_with, args=(words,), daemon=True).start()
+        main(Path(sys.argv[1]), Path(sys.argv[2]), first, own)
