@@ -4,6 +4,7 @@
     python3 run.py demo [ARGS]     the whole flow: measure, fit, bake, walk
     python3 run.py lambent ARGS    any command, e.g. `python3 run.py lambent doctor`
     python3 run.py test [ARGS]     style, types and tests; with ARGS, pytest alone with these
+    python3 run.py docs            the documentation as a site, in out/site
 
 The first run makes .venv here, installs the versions named in constraints.txt, and asks `lambent doctor` what the
 system lacks; on Debian and Ubuntu it installs that, elsewhere it prints the one command. Later runs start at once
@@ -34,12 +35,12 @@ class Stop(Exception):
 def main(arguments):
     if sys.version_info[:2] not in PYTHONS:
         return subprocess.call([*suitable_python(), __file__, *arguments])
-    tasks = {"demo": run_demo, "lambent": run_lambent, "test": run_tests}
+    tasks = {"demo": run_demo, "lambent": run_lambent, "test": run_tests, "docs": run_docs}
     if not arguments or arguments[0] not in tasks:
         print(__doc__)
         return 0 if arguments[:1] in (["-h"], ["--help"]) else 2
     os.environ["PYTHONUTF8"] = "1"
-    set_up(for_tests=arguments[0] == "test")
+    set_up(for_tests=arguments[0] in ("test", "docs"))
     return tasks[arguments[0]](arguments[1:])
 
 
@@ -73,6 +74,10 @@ def run_tests(arguments):
             failed.append(command[0])
     say(f"failed: {', '.join(failed)}" if failed else "all passed")
     return 1 if failed else 0
+
+
+def run_docs(arguments):
+    return subprocess.call([PYTHON, "-m", "mkdocs", "build", *arguments], cwd=HOME)
 
 
 def set_up(for_tests):

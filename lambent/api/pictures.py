@@ -112,7 +112,7 @@ class Comparison:
 
 
 def compare(reference: Picture | Floats | str | Path, test: Picture | Floats | str | Path) -> Comparison:
-    """Compare two pictures: PSNR, RMSE in RGB and L*a*b*, FLIP with its worst 16x16 tile.
+    """Compare two pictures: PSNR, RMSE in RGB and CIELAB, FLIP with its worst 16x16 tile.
 
     Where both are radiance, PSNR and FLIP compare clip(e L)^(1/2.2), with e such that the reference has a mean of .3,
     and RMSE compares radiance; otherwise all compare the pictures as a display shows them. Arrays are radiance.

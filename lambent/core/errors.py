@@ -13,6 +13,8 @@ LONGEST = 600  # characters of a message or a path
 class UserError(Exception):
     """Input that cannot be used, reported in one line: file, field, found, expected, hint.
 
+    `got` is cut to a length that fits a terminal, `expected` to four times that; the hint is shown whole.
+
     Parameters
     ----------
     message : str
@@ -23,8 +25,6 @@ class UserError(Exception):
         The value found there, and the values allowed there.
     hint : str, optional
         A remedy.
-
-    `got` is cut to a length that fits a terminal, `expected` to four times that; the hint is shown whole.
     """
 
     def __init__(
