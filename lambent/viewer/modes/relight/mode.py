@@ -105,14 +105,14 @@ class RelightMode(Mode):
 
 
 def draw_head(state: RelightState) -> None:
-    """Draw the way back to the room, undo and redo, and lines on the store's session."""
+    """Draw the way back to the room, undo and redo, and what was wrong with the store's session."""
     edits, meaning = state.edits, "walks through the room from here, with its own sky"
     buttons([
         ("undo", edits.can_undo, edits.undo, "undoes the last step (Ctrl+Z)"),
         ("redo", edits.can_redo, edits.redo, "redoes the step (Ctrl+Shift+Z)"),
         ("walk from here", state.keeper.keeps, state.enter_room, meaning),
     ])  # fmt: skip
-    wrapped(list(dict.fromkeys((*state.lines, *state.said))))
+    wrapped(state.lines)
 
 
 def draw_sky(state: RelightState) -> None:
