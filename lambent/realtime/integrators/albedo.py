@@ -16,10 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
-from lambent.core.geometry.directions import normalize
 from lambent.materials.document import Lobe
 from lambent.materials.lobes import mean_reflectance, passed, widths
-from lambent.realtime.integrators.patterns import lobe_points, rings_table
+from lambent.realtime.integrators.patterns import gains, lobe_points, rings_table
 
 FACTORS = 32  # at cos_o = (i + 1/2)/FACTORS, four to a row: FACTOR_ROWS in rings.wgsl
 EXACT_SAMPLES = 512
@@ -27,7 +26,6 @@ AZIMUTHS = 6
 LEAST, MOST = 0.5, 2.0
 TABLE_ROWS = 32  # of split-sum
 LEVELS = 7  # roughness m of level l is (l/(LEVELS - 1))^2: finer steps where they show
-COS_MIN = 1e-4  # LAMBENT_COS_MIN
 
 
 def normalised_rings_table(lobe: Lobe, n: int) -> Floats:
@@ -72,17 +70,3 @@ def albedo_table(lobe: Lobe, samples: int = 1024) -> Floats:
     cos_d, g = gains(lobe, slopes, (np.arange(TABLE_ROWS) + 0.5) / TABLE_ROWS)
     albedos = [(passed(np.clip(cos_d, 0, 1), lobe, c) * g).mean(axis=1) for c in range(3)]
     return np.column_stack([*albedos, np.zeros(TABLE_ROWS)]).astype(np.float32)
-
-
-def gains(lobe: Lobe, slopes: Floats, cos_o: Floats, phi_rad: float = 0.0) -> tuple[Floats, Floats]:
-    """cos_d = wo.h, and f cos_i/pdf without k and Fresnel: both (views, n), for half vectors with slopes (n, 2).
-
-    Viewers are at cos_o (views,) and azimuth `phi_rad`. Directions below the horizon have gain 0.
-    """
-    h = normalize(np.column_stack([slopes, np.ones(len(slopes))]))
-    cos_o = cos_o[:, None]
-    cos_d = np.sqrt(1 - cos_o**2) * (h[:, 0] * np.cos(phi_rad) + h[:, 1] * np.sin(phi_rad)) + cos_o * h[:, 2]
-    cos_i = 2 * cos_d * h[:, 2] - cos_o
-    seen = (cos_d > COS_MIN) & (cos_i > COS_MIN)
-    safe = np.where(seen, cos_i, 1.0)
-    return cos_d, np.where(seen, safe / ((safe * cos_o) ** lobe.alpha * h[:, 2]), 0.0)

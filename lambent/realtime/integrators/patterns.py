@@ -11,13 +11,16 @@ Sources: thesis M, section 4.4.3 (eqs 4.10-4.17); Colbert & Krivanek 2007, "GPU-
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
+from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.sequences import hammersley
 from lambent.materials.document import Lobe, Material
 from lambent.materials.lobes import density_of_slopes, slope_radius, widths
@@ -26,7 +29,10 @@ RINGS: dict[int, tuple[int, ...]] = {
     1: (1,), 3: (3,), 5: (1, 4), 7: (1, 6), 9: (2, 7), 11: (1, 5, 5), 13: (1, 6, 6), 15: (1, 7, 7), 17: (1, 8, 8),
     19: (1, 6, 6, 6), 40: (1, 13, 13, 13),
 }  # fmt: skip
-LONG_TAILED = {7: (1, 3, 3), 9: (1, 4, 4)}  # of curve lobes, whose tails need a ring of their own
+FEW = 10  # up to this number of samples, the rings of curve lobes are fitted
+VIEWER = 2 / 3  # cos_o of their viewer, its mean over a surface's projected area
+APART2 = 6.0, 24.0  # squared distance of a fitted ring's samples over their filters' variance; the latter shows them
+COS_MIN = 1e-4  # LAMBENT_COS_MIN
 N_MAX = 64
 LINE_RATIO, LINE_BLEND = 3.0, 4 / 3  # ratio of roughnesses where rings turn into a line, at n = 7; width of the blend
 CENTRE_WEIGHT, CENTRE_WEIGHT_FEW = 1.8, 1.3  # of the centre sample, relative to the mean; the latter below 7 samples
@@ -39,13 +45,11 @@ BORDER_MASS = 0.01  # share of the lobe outside its border (4.10)
 RING_XI1 = 0.6  # the thesis's ring, 40 % of the way to the border
 
 
-def ring_counts(n: int, has_curve: bool = False) -> tuple[int, ...]:
-    """Samples per ring, from the centre outwards: tested splits; for other n, a centre and rings of about seven."""
-    if has_curve and n in LONG_TAILED:
-        return LONG_TAILED[n]
-    if n in RINGS:
+def ring_counts(n: int, is_fitted: bool = False) -> tuple[int, ...]:
+    """Samples per ring, from the centre outwards: tested splits, or a centre and rings of about 7 (fitted: 4)."""
+    if n in RINGS and not is_fitted:
         return RINGS[n]
-    rings = max(1, round((n - 1) / 7))
+    rings = max(1, round((n - 1) / (4 if is_fitted else 7)))
     outer = [(n - 1) // rings + (1 if j >= rings - (n - 1) % rings else 0) for j in range(rings)]
     return (1, *outer) if n > 1 else (1,)
 
@@ -64,13 +68,15 @@ def ring_pattern(n: int, lobe: Lobe) -> Pattern:
 
     Ring samples carry equal mass, the centre more: 1.8/n of the lobe, by experiment. Filters of .6 of the covering size
     are the sharpest, but break the highlight of a small lamp into one piece per sample. Filters of `ring_bias` keep it
-    nearly whole, and `ring_stretch` shrinks the rings to preserve the lobe's width.
+    nearly whole, and `ring_stretch` shrinks the rings to preserve the lobe's width. Few samples of a curve are fitted.
     """
-    counts = ring_counts(n, lobe.shape is not None)
+    if lobe.shape is not None and n <= FEW:
+        return fitted_pattern(n, lobe)
+    counts = ring_counts(n)
     centred = counts[0] == 1 and n > 1
     centre = 0.0 if not centred else CENTRE_WEIGHT_FEW if n < 7 else CENTRE_WEIGHT
     weight = np.full(n, (n - centre) / (n - centred))
-    slopes, before = [], 0.0
+    radii, before = [], 0.0
     for j, count in enumerate(counts):
         if j == 0 and count == 1:
             r, mass = 0.0, centre or 1.0
@@ -78,11 +84,69 @@ def ring_pattern(n: int, lobe: Lobe) -> Pattern:
         else:
             mass = count * weight[-1]
             r = ring_stretch(n) * float(slope_radius(min((before + mass / 2) / n, 0.9999), lobe))
-        phi = 2 * np.pi * np.arange(count) / count + (np.pi / count if j % 2 else 0)
-        slopes.append(polar(r, phi))
+        radii.append(r)
         before += mass
-    points = np.concatenate(slopes)
+    points = staggered(counts, radii)
     return Pattern(points, ring_bias(n) * weight / density(points, lobe), weight)
+
+
+def staggered(counts: tuple[int, ...], radii: Sequence[float] | Floats) -> Floats:
+    """(n, 2) points of rings of `counts` samples."""
+    turns = [(np.arange(count) + (0.5 if j % 2 else 0)) / count for j, count in enumerate(counts)]
+    return np.concatenate([polar(r, 2 * np.pi * turn) for r, turn in zip(radii, turns, strict=True)])
+
+
+def fitted_pattern(n: int, lobe: Lobe) -> Pattern:
+    """A centre and staggered rings that come closest to a curve lobe: to its core, its tail, its flat top."""
+    counts, m = ring_counts(n, is_fitted=True), float(np.sqrt(lobe.mx * lobe.my))
+    alike = Lobe(mx=m, my=m, alpha=lobe.alpha, retro=lobe.retro, distribution="curve", shape=lobe.shape)
+    weights, radii, variances = fitted_rings(counts, alike)
+    factor, weight = (np.repeat(each, counts) for each in (4 * n / np.pi * variances, n * weights / counts))
+    return Pattern(staggered(counts, radii), factor, weight)
+
+
+@lru_cache(maxsize=256)
+def fitted_rings(counts: tuple[int, ...], lobe: Lobe) -> Floats:
+    """(3, J): weights of sum 1, radii, and variances of filters, of rings of `counts` samples; slopes over mx = my.
+
+    A look-up of solid angle w blurs like a Gaussian of variance w/4 (cube_mips.py), so r^2 of what a ring sees has a
+    known mean and variance; its law is nearly that of Nakagami, a gamma distribution. The rings' shares and scales
+    minimise the squared difference of their law from the lobe's, integrated over r (Cramer's distance).
+    """
+    from scipy import optimize, special
+
+    rho, inside, gain = shown_radii(lobe)
+    at = np.geomspace(0.02, 1.5 * np.interp(0.999, inside, rho), 32)
+    rings, count, wanted = len(counts), np.array(counts), np.interp(at, rho, inside)
+
+    def parts(x: Floats) -> tuple[Floats, Floats, Floats]:
+        shares, edge = np.exp(np.append(x[: rings - 1], 0.0)), x[-1]
+        gap2 = 4 * np.sin(np.pi / count) ** 2 / (APART2[0] ** (1 - edge) * APART2[1] ** edge)
+        return shares / shares.sum(), np.exp(x[rings - 1 : -1, None]), np.where(count > 1, 1 / (1 + 2 * gap2), 0.0)
+
+    def difference(x: Floats) -> Floats:
+        shares, scales, tight = parts(x)
+        k = 1 / (1 - tight[:, None] ** 2)
+        return np.asarray((shares @ special.gammainc(k, k / 2 * (at / scales) ** 2) - wanted) * np.sqrt(at))
+
+    middles = np.log(np.interp((np.arange(rings) + 0.5) / rings, inside, rho))
+    start, most = np.concatenate([np.zeros(rings - 1), middles, [0.5]]), np.append(np.full(2 * rings - 1, 12.0), 1.0)
+    bounds = np.append(-most[:-1], 0), most
+    found = optimize.least_squares(difference, start, bounds=bounds, max_nfev=60, xtol=1e-3, ftol=1e-3)
+    shares, scales, tight = parts(found.x)  # tight: what its radius makes of the variance of what a ring sees
+    radii = scales[:, 0] * np.sqrt(2 * tight)
+    weights = shares / np.maximum(np.interp(radii, rho, gain), 0.1)
+    return np.stack([weights / weights.sum(), radii, scales[:, 0] ** 2 * (1 - tight)])
+
+
+def shown_radii(lobe: Lobe) -> tuple[Floats, Floats, Floats]:
+    """Radii (N,), the share (N,) of a lobe's light above the horizon within, and the gain (N,) there, by VIEWER."""
+    beyond = (np.arange(500)[::-1] + 0.5) / 500
+    rho = slope_radius(1 - beyond * beyond, lobe)
+    slopes, azimuths = polar(rho * lobe.mx, np.zeros(500)), (np.arange(8) + 0.5) / 8 * np.pi
+    gain = np.mean([gains(lobe, slopes, np.array([VIEWER]), phi)[1][0] for phi in azimuths], axis=0)
+    inside = np.cumsum(beyond * np.maximum(gain, 1e-6))  # a lobe may lie below the horizon
+    return rho, inside / inside[-1], gain
 
 
 def ring_bias(n: int) -> float:
@@ -172,6 +236,20 @@ def rings_table(lobe: Lobe, n: int) -> Floats:
     factor = np.exp((1 - share) * np.log(rings.factor[order]) + share * np.log(line.factor))
     weight = (1 - share) * rings.weight[order] + share * line.weight
     return table(blended(rings.slopes, line.slopes, lobe), factor, lobe, weight)
+
+
+def gains(lobe: Lobe, slopes: Floats, cos_o: Floats, phi_rad: float = 0.0) -> tuple[Floats, Floats]:
+    """cos_d = wo.h, and f cos_i/pdf without k and Fresnel: both (views, n), for half vectors with slopes (n, 2).
+
+    Viewers are at cos_o (views,) and azimuth `phi_rad`. Directions below the horizon have gain 0.
+    """
+    h = normalize(np.column_stack([slopes, np.ones(len(slopes))]))
+    cos_o = cos_o[:, None]
+    cos_d = np.sqrt(1 - cos_o**2) * (h[:, 0] * np.cos(phi_rad) + h[:, 1] * np.sin(phi_rad)) + cos_o * h[:, 2]
+    cos_i = 2 * cos_d * h[:, 2] - cos_o
+    seen = (cos_d > COS_MIN) & (cos_i > COS_MIN)
+    safe = np.where(seen, cos_i, 1.0)
+    return cos_d, np.where(seen, safe / ((safe * cos_o) ** lobe.alpha * h[:, 2]), 0.0)
 
 
 def lobe_points(n: int, lobe: Lobe) -> Floats:

@@ -145,8 +145,8 @@ fn gain(lobe: LambentLobe, wi: vec3f, wo: vec3f, h: vec3f) -> vec3f {
     return lambent_tint(dot(wo, h), lobe) * (wi.z / (lambent_cosine_power(wi, wo, lobe) * h.z));
 }
 
-// The tints of the fixed samples of a lobe, linear in cos_d: through the tints of half vectors one width of the lobe
-// before and behind the normal. Curves are looked up twice a lobe, not twice a sample.
+// The tints of the fixed samples of a lobe, linear in cos_d: through the tints of half vectors one standard deviation
+// of the lobe before and behind the normal (Gauss's nodes). Curves are looked up twice a lobe, not twice a sample.
 struct Tints {
     middle: vec3f,
     rise: vec3f,
@@ -154,7 +154,7 @@ struct Tints {
 
 fn tints(lobe: LambentLobe, wo: vec3f) -> Tints {
     if !LAMBENT_CURVES { return Tints(); }
-    let reach = max(lobe.spread * sqrt(lobe.mx * lobe.my * (1.0 - min(wo.z * wo.z, 1.0))), 0.01);
+    let reach = max(lobe.spread * sqrt(0.5 * lobe.mx * lobe.my * (1.0 - min(wo.z * wo.z, 1.0))), 0.01);
     let ends = clamp(wo.z + vec2f(-reach, reach), vec2f(0.0), vec2f(1.0));
     let low = lambent_tint(ends.x, lobe);
     let rise = (lambent_tint(ends.y, lobe) - low) / (ends.y - ends.x);

@@ -11,6 +11,7 @@ from lambent.core.geometry.cubemap import sample as sample_cube
 from lambent.core.views.camera import Camera, pixel_rays
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material
+from lambent.materials.slope_curve import NODES_RHO
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.integrators.albedo import albedo_table
 from lambent.realtime.renderer import Renderer
@@ -94,6 +95,21 @@ def test_few_samples_come_close_under_smooth_light(device, name: str) -> None:
         if (name, integrator) not in (("ggx", "lobe-4.25"), ("curve", "lobe-4.25")):
             image = renderer.image(replace(STATE, integrator=integrator, n=19))
             assert np.abs(image - truth).mean() < tolerance * truth.mean(), integrator
+
+
+@pytest.mark.parametrize("name, m", [("haze", 0.05), ("tail", 0.06), ("flat", 0.1)])
+def test_seven_samples_hold_core_and_tail_of_a_curve(device, name: str, m: float) -> None:
+    """A lamp far from the mirror direction lights the tail alone; rings of equal mass err twice as much."""
+    r2 = NODES_RHO**2
+    shapes = {"haze": np.exp(-r2) + 0.02 * np.exp(-r2 / 25), "tail": (1 + r2) ** -1.7, "flat": np.exp(-(r2**4))}
+    shape = tuple(np.maximum(shapes[name], 1e-12).tolist())
+    of = material((Lobe(mx=m, my=m, r0=0.9, alpha=0.3, distribution="curve", shape=shape),))
+    lamp = np.array([0.1, -0.7, 0.7]) / np.linalg.norm([0.1, -0.7, 0.7])
+    cube = cube_of(lambda w: smooth_light(w) + 20 * np.exp(20 * (w @ lamp - 1))[..., None])
+    renderer = Renderer(device, wall_scene(of, cube))
+    truth = renderer.converged(STATE, 4096)
+    image = renderer.image(replace(STATE, integrator="rings", n=7))
+    assert np.abs(image - truth).mean() < {"haze": 0.075, "tail": 0.09, "flat": 0.025}[name] * truth.mean()
 
 
 def test_a_retro_reflector_shows_the_light_behind_the_viewer(device) -> None:
