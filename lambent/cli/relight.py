@@ -50,7 +50,11 @@ def command(
         for name, given in (("exposure", exposure is not None), ("force", force), ("json", json)):
             if given:
                 raise UserError("is for a picture", field=f"--{name}", hint="name it with -o")
-        _show(store, camera, environment, {"layout": layout, "up": up, "scale": scale}, turn, size)
+        pixels = parse_size(size)
+        from lambent.viewer import app
+
+        sky = None if environment is None else {"path": environment, "layout": layout, "up": up, "scale": scale}
+        app.run(store, "relight", size=pixels, camera=camera, environment=sky, turn_deg=turn)
         return
     from lambent.core.light.colour import shown
     from lambent.core.light.exposure import metered
@@ -77,19 +81,6 @@ def command(
     facts = {"written": output, "camera": record.camera.name, "size": [record.width, record.height]}
     text = f"{output}: {record.width}x{record.height}, camera {record.camera.name}, left out {100 * view.error:.2g} %"
     show({**facts, "left_out": view.error}, text, json)
-
-
-def _show(
-    store: Path, camera: str | None, environment: Path | None, how: dict[str, object], turn_deg: float | None, size: str
-) -> None:
-    """Open the window; what is wrong is said without a display, too."""
-    pixels = parse_size(size)
-    from lambent.viewer import app
-    from lambent.viewer.modes.relight import check
-
-    light = None if environment is None else {"path": environment, **how}
-    check(store, camera, light)
-    app.run(store, "relight", size=pixels, camera=camera, environment=light, turn_deg=turn_deg)
 
 
 def _chosen(store: Store, camera: str | None) -> ViewRecord:

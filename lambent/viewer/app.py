@@ -46,7 +46,7 @@ def run(
     found = starts()
     module = found[known("mode", mode, found)]
     if hasattr(module, "check"):
-        module.check(Path(path))
+        module.check(Path(path), **options)
     check_display(module.NO_DISPLAY)
     opened = module.start(Path(path), mode, Screen(folder or Path.cwd()), **options)
     from lambent.viewer.window import Window

@@ -148,7 +148,7 @@ class Mode:
         """Stop background work after the window was closed, and name unsaved work on stderr."""
 
 
-def check_there(path: Path) -> None:
+def check_there(path: Path, **_: object) -> None:
     """Raise `UserError` if `path` is neither a file, a folder, nor a built-in scene."""
     if not path.exists() and not str(path).startswith(BUILTIN_PREFIX):
         raise UserError("file does not exist", file=path)

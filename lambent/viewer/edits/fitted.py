@@ -23,8 +23,19 @@ from lambent.viewer.screen import Rect, Screen, Statistics
 FORMAT = "rgba8unorm"  # values are encoded
 
 
+class FittedFrame(Protocol):
+    """A picture, the picture A that it is compared with, if any, and the time that it took."""
+
+    @property
+    def shown(self) -> Shown: ...
+    @property
+    def compared(self) -> Shown | None: ...
+    @property
+    def seconds(self) -> float: ...
+
+
 class Fitted(Protocol):
-    """State of a mode with a picture of a fixed `size` (width, height); `scale` is that of its false colours."""
+    """State of a mode with pictures of a fixed `size` (width, height); `scale` is that of their false colours."""
 
     screen: Screen
     look: Look
@@ -36,10 +47,12 @@ class Fitted(Protocol):
     def size(self) -> tuple[int, int]: ...
     @property
     def scale(self) -> Range | None: ...
+    def take(self) -> FittedFrame | None: ...
+    def close(self) -> None: ...
 
 
 class FittedDrawing(Drawing):
-    """Uploads the pictures that `show` gives it."""
+    """Uploads the last frame."""
 
     def __init__(self, device: Any, state: Fitted) -> None:
         super().__init__(device)
@@ -48,7 +61,8 @@ class FittedDrawing(Drawing):
         self._pair = [texture.create_view() for texture in self._textures]
         # A second view of B: Dear ImGui's backend drops a view one frame after its name changes.
         self._alone = [self._textures[1].create_view()]
-        self._shown: list[Shown | None] = [None, None]
+        self._put: list[Shown | None] = [None, None]
+        self._frame: FittedFrame | None = None
         self._adapter = adapter_info(device).name if device is not None else ""
 
     @property
@@ -65,23 +79,27 @@ class FittedDrawing(Drawing):
         wide, high = max(1, round(scale * width)), max(1, round(scale * height))
         return Rect(place.x + (place.width - wide) // 2, place.y + (place.height - high) // 2, wide, high)
 
-    def show(self, picture: Shown, compared: Shown | None = None, seconds: float = 0.0) -> None:
-        """Upload a picture that took this time, and the picture A that it is compared with."""
-        for k, shown in enumerate((compared, picture)):
-            if shown is not None and shown is not self._shown[k]:
+    def update(self, place: Rect, pixel_ratio: float) -> None:
+        """Upload the changes of the last frame."""
+        self._ratio, state = pixel_ratio, self._fitted
+        frame = state.take()
+        if frame is None or frame is self._frame:
+            return
+        self._frame = frame
+        for k, shown in enumerate((frame.compared, frame.shown)):
+            if shown is not None and shown is not self._put[k]:
                 shown.put(self._textures[k])
-            self._shown[k] = shown
-        screen = self._fitted.screen
-        screen.statistics = Statistics(self._adapter, frame_ms=1e3 * seconds, resolution=self._fitted.size)
+                self._put[k] = shown
+        state.screen.statistics = Statistics(self._adapter, frame_ms=1e3 * frame.seconds, resolution=state.size)
 
     def save(self) -> None:
         """Write the picture as shown (PNG) and as radiance (EXR); in a comparison also the picture A."""
-        (compared, picture), screen = self._shown, self._fitted.screen
-        if picture is None:
+        frame, screen = self._frame, self._fitted.screen
+        if frame is None:
             screen.say("picture not saved: nothing is drawn yet")
             return
         stem = unused(screen.folder, plain_name(self._fitted.name, "scene"), ".png", ".exr", "-A.png", "-A.exr")
-        pictures = [("", picture)] + ([("-A", compared)] if compared is not None else [])
+        pictures = [("", frame.shown)] + ([("-A", frame.compared)] if frame.compared is not None else [])
         try:
             for ending, shown in pictures:
                 write_image(screen.folder / f"{stem}{ending}.exr", shown.radiance)
@@ -90,6 +108,10 @@ class FittedDrawing(Drawing):
             screen.say(f"picture not saved: {error}")
         else:
             screen.say(f"saved {stem}.png and {stem}.exr")
+
+    def close(self) -> None:
+        """Stop background work."""
+        self._fitted.close()
 
     def _with_scale(self, shown: Bytes) -> Bytes:
         scale = self._fitted.scale

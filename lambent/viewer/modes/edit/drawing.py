@@ -7,19 +7,16 @@ from typing import Any
 
 from lambent.viewer.edits.fitted import FittedDrawing
 from lambent.viewer.mode import Divider, Image
-from lambent.viewer.modes.edit.painter import Frame
 from lambent.viewer.modes.edit.state import EditState
-from lambent.viewer.screen import Rect
 
 
 class EditDrawing(FittedDrawing):
-    """Uploads the painter's frames."""
+    """Uploads the painter's frames, and the outlines over them."""
 
     def __init__(self, device: Any, state: EditState) -> None:
         super().__init__(device, state)
         self._state = state
         self._outline: tuple[object, Image] | None = None
-        self._frame: Frame | None = None
 
     @property
     def divider(self) -> Divider | None:
@@ -35,15 +32,3 @@ class EditDrawing(FittedDrawing):
         if self._outline is None or self._outline[0] != wanted:
             self._outline = wanted, view.outline(set(wanted))
         return {"outline": self._outline[1]}
-
-    def update(self, place: Rect, pixel_ratio: float) -> None:
-        """Upload the changes of the last frame."""
-        self._ratio = pixel_ratio
-        frame = self._state.painter.take()
-        if frame is not None and frame is not self._frame:
-            self._frame = frame
-            self.show(frame.shown, frame.compared, frame.seconds)
-
-    def close(self) -> None:
-        """Stop background work."""
-        self._state.close()

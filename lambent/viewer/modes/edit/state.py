@@ -120,6 +120,10 @@ class EditState:
         """Width and height of the picture in pixels."""
         return self.session.document.size
 
+    def take(self) -> Frame | None:
+        """The last frame, to show it."""
+        return self.painter.take()
+
     @property
     def busy(self) -> bool:
         """Whether background work with visible progress runs."""

@@ -14,7 +14,7 @@ STARTS = ("relight",)
 NO_DISPLAY = "name a picture with -o"
 
 
-def check(path: Path, camera: str | None = None, environment: dict[str, Any] | None = None) -> None:
+def check(path: Path, camera: str | None = None, environment: dict[str, Any] | None = None, **_: object) -> None:
     """Raise `UserError` if there is no room at `path`, or no such camera or image; called before a window is opened."""
     from lambent.viewer.modes.relight.view import cameras_of, sky_of
 
@@ -28,10 +28,11 @@ def check(path: Path, camera: str | None = None, environment: dict[str, Any] | N
 def start(path: Path, name: str, screen: Screen, *, device: Any = None, **options: Any) -> Mode:
     """Start the mode on a store; options as of `state.RelightState`."""
     from lambent.realtime.gpu.device import open_room_device
+    from lambent.viewer.edits.fitted import FittedDrawing
     from lambent.viewer.edits.shown import backend_of
-    from lambent.viewer.modes.relight.mode import RelightDrawing, RelightMode
+    from lambent.viewer.modes.relight.mode import RelightMode
     from lambent.viewer.modes.relight.state import RelightState
 
     device = device or open_room_device()
     state = RelightState(Store.open(path), screen, backend_of(device), **options)
-    return RelightMode(state, RelightDrawing(device, state))
+    return RelightMode(state, FittedDrawing(device, state))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 from imgui_bundle import imgui
 
@@ -11,14 +10,13 @@ from lambent.core.light.photometry import LUMINANCE
 from lambent.viewer.background.lost import rescued
 from lambent.viewer.background.work import POLL_S
 from lambent.viewer.cameras.navigation import Navigation
-from lambent.viewer.edits.fitted import FittedDrawing
 from lambent.viewer.input import Input
 from lambent.viewer.mode import Drawing, Mode, Panel, Textures
 from lambent.viewer.modes.relight.state import RelightState
 from lambent.viewer.panels import look as looks
 from lambent.viewer.panels import overlay
 from lambent.viewer.panels.widgets import buttons, rows, slider, typed_field, wrapped
-from lambent.viewer.screen import Rect, least
+from lambent.viewer.screen import least
 
 SHORTCUTS = (
     ("left drag", "turn the sky"),
@@ -45,19 +43,6 @@ class RelightInput(Input):
 
     def saved(self) -> None:
         self._state.keeper.save()
-
-
-class RelightDrawing(FittedDrawing):
-    """Uploads the last picture."""
-
-    def __init__(self, device: Any, state: RelightState) -> None:
-        super().__init__(device, state)
-        self._state = state
-
-    def update(self, place: Rect, pixel_ratio: float) -> None:
-        self._ratio, frame = pixel_ratio, self._state.frame
-        if frame is not None:
-            self.show(frame.shown, seconds=frame.seconds)
 
 
 class RelightMode(Mode):
@@ -99,9 +84,6 @@ class RelightMode(Mode):
     def rescue(self) -> None:
         rescued("the session", self.state.keeper.rescue)
         self.state.stop_baking()
-
-    def close(self) -> None:
-        self.state.close()
 
 
 def draw_head(state: RelightState) -> None:

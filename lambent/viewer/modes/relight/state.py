@@ -43,6 +43,7 @@ class Frame:
     look: Look
     shown: Shown
     seconds: float
+    compared: None = None
 
 
 @dataclass(frozen=True)
@@ -116,6 +117,10 @@ class RelightState:
     def scale(self) -> Range | None:
         """Scale of the picture's false colours, if any."""
         return self.look.scale if self.look.is_false_coloured else None
+
+    def take(self) -> Frame | None:
+        """The last picture."""
+        return self.frame
 
     @property
     def has_sky(self) -> bool:

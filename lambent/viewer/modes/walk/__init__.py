@@ -14,7 +14,7 @@ STARTS = ("walk", "view")
 NO_DISPLAY = "use `lambent render` or `lambent demo --headless`"
 
 
-def check(path: Path) -> None:
+def check(path: Path, **_: object) -> None:
     """Raise `UserError` if there is no store at `path`; called before a window is opened."""
     Store.open(path).close()
 
