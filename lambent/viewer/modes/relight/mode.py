@@ -82,7 +82,8 @@ class RelightMode(Mode):
         self.state.keeper.save()
 
     def rescue(self) -> None:
-        rescued("the session", self.state.keeper.rescue)
+        if self.state.keeper.keeps:
+            rescued("the session", self.state.keeper.rescue)
         self.state.stop_baking()
 
 
@@ -92,7 +93,7 @@ def draw_head(state: RelightState) -> None:
     buttons([
         ("undo", edits.can_undo, edits.undo, "undoes the last step (Ctrl+Z)"),
         ("redo", edits.can_redo, edits.redo, "redoes the step (Ctrl+Shift+Z)"),
-        ("walk from here", state.keeper.keeps, state.enter_room, meaning),
+        ("walk from here", state.keeper.keeps and state.has_room, state.enter_room, meaning),
     ])  # fmt: skip
     wrapped(state.lines)
 

@@ -84,6 +84,7 @@ class RelightState:
         chosen = None if camera is None else cameras[known("camera", camera, cameras, field="--camera")]
         sky = None if environment is None else sky_of(**environment, folder=store.folder)
         self.name, self.bounds, self.edits = record.name, record.bounds, MaterialEdits(record.materials)
+        self.has_room = bool(record.objects)  # else it is a store of views alone
         self.keeper = SessionKeeper(self.edits, store.folder, screen)
         self.lines = self.keeper.open(None)
         self.look = Settings(exposure_ev=record.exposure_ev or 0.0, shows=("full",))

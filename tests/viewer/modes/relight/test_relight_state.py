@@ -14,6 +14,8 @@ from lambent.store.kept.session import FILE, RelitSky, read_session
 from lambent.store.store import MANIFEST, Store
 from lambent.viewer.edits.session_file import READ_ONLY
 from lambent.viewer.edits.tone import displayed
+from lambent.viewer.mode import Drawing
+from lambent.viewer.modes.relight.mode import RelightMode
 from lambent.viewer.modes.relight.state import NO_SKY
 from tests.viewer.modes.relight.conftest import SIZE, settled
 
@@ -222,6 +224,15 @@ def test_a_second_window_is_read_only(opened, tray):
     assert second.said[0] == READ_ONLY and second.keeper.unsaved == ("the sky of relit views",)
     second.close()
     assert not (tray / FILE).exists()
+
+
+def test_a_lost_window_rescues_what_it_owns(opened, tray, capsys):
+    first, second = opened(tray), opened(tray)
+    for state in (second, first):
+        state.turn(10.0)
+        RelightMode(state, Drawing(None)).rescue()
+        assert (tray / FILE).exists() == (state is first), "the other window's session is not touched"
+    assert read_session(tray / FILE).sky.turn_deg == 10.0 and "tray.store" in capsys.readouterr().err
 
 
 def test_a_light_mix_is_named_as_not_shown(opened, tray):
