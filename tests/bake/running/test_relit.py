@@ -7,6 +7,7 @@ from lambent.bake.bake import bake
 from lambent.bake.quality import quality_named
 from lambent.bake.running.relit import Relit, relight_copy
 from lambent.bake.transport.view import View
+from lambent.core.errors import UserError
 from lambent.core.light.light_mix import GroupMix, LightMix
 from lambent.editing.relit_view import RelitView
 from lambent.scenes import load_scene
@@ -63,6 +64,9 @@ def test_edits_go_to_a_store_beside_it(store):
     assert keys(folder) == before and np.isfinite(green).all()
 
 
-def test_lamps_are_part_of_the_room(store):
+def test_lamps_that_the_scene_lacks_are_refused(store):
     folder, view = store
-    assert Relit(folder, RoomState(lamps={0: LampEdit()}), view).place == relight_copy(folder)
+    relit = Relit(folder, RoomState(lamps={7: LampEdit((0.0, 1.0, 0.0))}), view)
+    assert relit.place == relight_copy(folder)
+    with pytest.raises(UserError, match="no such lamp"):
+        relit.scene()
