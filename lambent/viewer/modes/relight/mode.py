@@ -8,7 +8,6 @@ from imgui_bundle import imgui
 
 from lambent.core.light.photometry import LUMINANCE
 from lambent.viewer.background.lost import rescued
-from lambent.viewer.background.work import POLL_S
 from lambent.viewer.cameras.navigation import Navigation
 from lambent.viewer.input import Input
 from lambent.viewer.mode import Drawing, Mode, Panel, Textures
@@ -16,7 +15,6 @@ from lambent.viewer.modes.relight.state import RelightState
 from lambent.viewer.panels import look as looks
 from lambent.viewer.panels import overlay
 from lambent.viewer.panels.widgets import buttons, rows, slider, typed_field, wrapped
-from lambent.viewer.screen import least
 
 SHORTCUTS = (
     ("left drag", "turn the sky"),
@@ -62,7 +60,7 @@ class RelightMode(Mode):
         self.state.tick()
 
     def wait_s(self) -> float | None:
-        return least(POLL_S if self.state.busy else None, self.state.keeper.wait_s())
+        return self.state.keeper.wait_s()  # background work wakes the window
 
     def draw_over(self, textures: Textures) -> None:
         if self.state.scale is not None:
