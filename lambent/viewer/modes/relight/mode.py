@@ -115,9 +115,9 @@ def draw_sky(state: RelightState) -> None:
 def draw_scene(state: RelightState) -> None:
     """Draw what the picture is of."""
     width, height = state.size
-    image = state.edits.sky.environment
+    image, own = state.edits.sky.environment, "the scene's" if state.has_sky else "none"
     rows(
         [("camera", state.view.camera.name), ("picture", f"{width} x {height}"),
-         ("sky", "the scene's" if image is None else image.file.rpartition("/")[2]),
+         ("sky", own if image is None else image.file.rpartition("/")[2]),
          ("light", "direct, with shadows")], "scene"
     )  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from lambent.editing.relit_view import views_for_relighting
 from lambent.store.contract import baked_views, scene_record, view_key
 from lambent.store.kept.session import Surroundings
 from lambent.store.kept.views import read_views
-from lambent.store.store import MANIFEST, Store
+from lambent.store.store import Store
 from lambent.viewer.editor.files import ENVIRONMENTS
 from lambent.viewer.modes.edit.subject import SIZE, of_aspect
 
@@ -30,12 +31,13 @@ def cameras_of(store: Store) -> dict[str, Camera]:
 
 def view_of(store: Store, camera: Camera, fitting: tuple[int, int] | None) -> View:
     """The view at a camera, in the largest size whose bake for relighting has begun, or the aspect of `fitting`."""
-    copy, sizes = relight_copy(store.folder), list[tuple[int, int]]()
-    for one in (store, *([Store.open(copy)] if (copy / MANIFEST).exists() else [])):
+    stores, sizes = [store], list[tuple[int, int]]()
+    with suppress(UserError):  # without one; where it is damaged, the search for the view says so
+        stores.append(Store.open(relight_copy(store.folder)))
+    for one in stores:
         begun = {artefact.name.split("/")[1] for artefact in one.artefacts("relighting")}
         views = (view for key, view in baked_views(one).items() if key in begun)
-        at = view_key(camera)
-        sizes += [(view.width, view.height) for view in views if view_key(view.camera) == at]
+        sizes += [(view.width, view.height) for view in views if view_key(view.camera) == view_key(camera)]
     return View(camera, *max(sizes, key=lambda size: size[0] * size[1], default=of_aspect(*(fitting or SIZE))))
 
 

@@ -166,6 +166,16 @@ def test_the_folder_of_something_else_is_left_alone(opened, gold_tray):
         Relit(gold_tray, state.edits.room, state.view).bake()
 
 
+def test_a_damaged_store_of_edited_views_is_a_line(opened, gold_tray, bakes):
+    copy = gold_tray.parent / COPY
+    copy.mkdir()
+    (copy / MANIFEST).write_text("{")
+    state = opened(gold_tray)
+    assert settled(state) is None and state.trouble.startswith("not baked: ") and COPY in state.trouble
+    state.edits.reset("nickel")
+    assert np.array_equal(settled(state), expected(gold_tray)) and not state.trouble and not bakes.begun
+
+
 def test_an_image_that_cannot_be_read_is_a_line(opened, tray, sky):
     state = opened(tray)
     before = settled(state)
