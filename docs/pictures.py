@@ -57,8 +57,8 @@ def main(demo: Path) -> None:
 
 def scenes(names: Sequence[str], samples: int = 1024) -> None:
     """Path trace scenes for editing by their cameras, in the sizes of the published pictures; all without names."""
-    from lambent.bake.engine import engine
-    from lambent.bake.reference.path_traced import render_reference
+    from lambent.baking.engine import engine
+    from lambent.baking.reference.path_traced import render_reference
     from lambent.scenes import load_scene
 
     engine()
@@ -73,9 +73,9 @@ def edit() -> None:
     """The teapot of `builtin:teatray` before and after edits of its curves, 4000 lights."""
     from tempfile import TemporaryDirectory
 
-    from lambent.bake.bake import bake
-    from lambent.bake.quality import quality_named
-    from lambent.bake.transport.view import View
+    from lambent.baking.bake import bake
+    from lambent.baking.quality import quality_named
+    from lambent.baking.transport.view import View
     from lambent.editing.curves.nodes import Which, values_of, with_values
     from lambent.editing.session.session import Session
     from lambent.editing.stored import edited_picture
@@ -102,11 +102,11 @@ def interreflections(samples: int = 512) -> None:
     """`builtin:cornell` after edits: direct light, with interreflections, and path traced."""
     from tempfile import TemporaryDirectory
 
-    from lambent.bake.bake import bake
-    from lambent.bake.interreflection.settings import Bounces
-    from lambent.bake.quality import quality_named
-    from lambent.bake.reference.path_traced import render_reference
-    from lambent.bake.transport.view import View
+    from lambent.baking.bake import bake
+    from lambent.baking.interreflection.settings import Bounces
+    from lambent.baking.quality import quality_named
+    from lambent.baking.reference.path_traced import render_reference
+    from lambent.baking.transport.view import View
     from lambent.editing.curves.nodes import Which, values_of, with_values
     from lambent.editing.interreflection.stored import interreflections as stored
     from lambent.editing.interreflection.whole import WholePicture
@@ -153,7 +153,7 @@ def light_groups(store: Path | None = None) -> None:
     from dataclasses import replace
     from tempfile import TemporaryDirectory
 
-    from lambent.bake.bake import bake
+    from lambent.baking.bake import bake
     from lambent.core.light.light_mix import parse_light
     from lambent.render import Settings, images
     from lambent.scenes import load_scene
@@ -185,7 +185,7 @@ def window(store: Path | None = None) -> None:
     import shutil
     from tempfile import TemporaryDirectory
 
-    from lambent.bake.bake import bake
+    from lambent.baking.bake import bake
     from lambent.core.light.light_mix import LightMix, parse_light
     from lambent.scenes import load_scene
     from lambent.store.kept.session import FILE, RoomState, WalkSession, write_session

@@ -2,7 +2,7 @@
 
 table = lambent.read("brushed.bsdf")                    # or a material, a scene, a store, an image
 material = table.fit(lobes="auto").material
-store = lambent.open("room.store")
+store = lambent.bake("room.toml", "room.store")         # or lambent.open("room.store")
 store.render("entrance", size=(640, 360)).save("entrance.png")
 
 Names are imported at their first use.
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from lambent.api.reading import open as open
     from lambent.api.reading import read as read
     from lambent.api.scenes import Scene as Scene
+    from lambent.api.scenes import bake as bake
     from lambent.api.stores import Store as Store
     from lambent.api.tables import Fit as Fit
     from lambent.api.tables import Table as Table
@@ -30,7 +31,7 @@ __version__ = "0.1.0"
 _MODULES = {
     "Comparison": "api.pictures", "Fit": "api.tables", "Material": "api.materials", "Picture": "api.pictures",
     "Scene": "api.scenes", "Store": "api.stores", "Table": "api.tables", "UserError": "core.errors",
-    "compare": "api.pictures", "open": "api.reading", "read": "api.reading",
+    "bake": "api.scenes", "compare": "api.pictures", "open": "api.reading", "read": "api.reading",
 }  # fmt: skip
 __all__ = ["__version__", *_MODULES]
 

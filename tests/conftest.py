@@ -62,11 +62,11 @@ def device(adapter: None) -> Any:
 @pytest.fixture(scope="session")
 def mi() -> Any:
     """Mitsuba with its variant set and our BSDFs registered; tests that need it skip where no variant works."""
-    from lambent.bake.engine import engine
+    from lambent.baking.engine import engine
 
     or_skip(engine)
-    from lambent.bake.bsdfs.material_plugin import register_material_plugin
-    from lambent.bake.bsdfs.table_plugin import register_table_plugin
+    from lambent.baking.bsdfs.material_plugin import register_material_plugin
+    from lambent.baking.bsdfs.table_plugin import register_table_plugin
 
     register_material_plugin()
     register_table_plugin()
@@ -78,9 +78,9 @@ def mi() -> Any:
 @pytest.fixture(scope="session")
 def baked_box(mi: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a store of the built-in box."""
-    from lambent.bake.bake import bake
+    from lambent.baking.bake import bake
     from lambent.scenes import load_scene
-    from tests.bake.small_scenes import TINY
+    from tests.baking.small_scenes import TINY
 
     folder = tmp_path_factory.mktemp("baked") / "box.store"
     bake(load_scene("builtin:box"), folder, quality=TINY).close()

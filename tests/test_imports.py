@@ -19,15 +19,15 @@ TESTS = sorted((ROOT / "tests").rglob("*.py"))
 
 # A room may import rooms of a lower floor, and itself.
 FLOOR = {
-    "core": 0, "materials": 1, "scenes": 2, "store": 3, "baked": 3.5, "bake": 4, "realtime": 4, "editing": 4,
+    "core": 0, "materials": 1, "scenes": 2, "store": 3, "baked": 3.5, "baking": 4, "realtime": 4, "editing": 4,
     "traced": 5, "viewer": 6, "render": 7, "published": 7, "report": 8, "bench": 8, "demo": 8, "api": 8.5, "cli": 9,
 }  # fmt: skip
 # Libraries that only some rooms may import.
 ONLY_IN = {
-    "mitsuba": {"bake", "published"},
-    "drjit": {"bake", "published"},
-    "pyoidn": {"bake"},
-    "xatlas": {"bake"},
+    "mitsuba": {"baking", "published"},
+    "drjit": {"baking", "published"},
+    "pyoidn": {"baking"},
+    "xatlas": {"baking"},
     "wgpu": {"realtime", "viewer"},
     "rendercanvas": {"realtime", "viewer"},
     "imgui_bundle": {"viewer"},
@@ -36,8 +36,8 @@ ONLY_IN = {
     "rich": {"api"},
     "zarr": {"store"},
     "numcodecs": {"store"},
-    "numba": {"core", "baked", "bake", "editing"},
-    "distributed": {"bake"},
+    "numba": {"core", "baked", "baking", "editing"},
+    "distributed": {"baking"},
 }
 HEAVY = {
     "mitsuba", "drjit", "wgpu", "rendercanvas", "imgui_bundle", "scipy", "matplotlib", "skimage", "trimesh", "zarr",

@@ -42,7 +42,7 @@ from lambent.store.contract import PROCESSOR_TIMINGS, TIMINGS
 from lambent.store.store import Store
 
 if TYPE_CHECKING:
-    from lambent.bake.context import BakeContext
+    from lambent.baking.context import BakeContext
 
 NAME = "answer"
 LEAST = 0.01  # of the mean light, the least denominator of relative errors
@@ -163,7 +163,7 @@ class Truth:
         return self._halves(self._chosen[self._contact], edited, self._effort.contact_paths, SEED + 1)
 
     def _halves(self, texels: Indices, edited: dict[str, Material], paths: int, seed: int) -> Floats:
-        from lambent.bake.reference.at_texels import retraced
+        from lambent.baking.reference.at_texels import retraced
 
         if not len(texels):
             return np.zeros((2, 0, 3))
@@ -171,13 +171,13 @@ class Truth:
 
     def _direct_sun(self) -> Floats:
         """Direct irradiance of the sun (n, 3), W/m^2."""
-        from lambent.bake.answering.spots import sun_at
+        from lambent.baking.answering.spots import sun_at
 
         return np.asarray(sun_at(self._context.traced)[0][self._chosen])
 
     def _contacts(self) -> Flags:
         """(n,) whether each texel is a contact."""
-        from lambent.bake.tracing.rays import cosine_directions, distances, leaving
+        from lambent.baking.tracing.rays import cosine_directions, distances, leaving
 
         t, whole = self._sides.texels, self._context.traced.whole(diffuse=True)
         p, n, flat = (
@@ -256,15 +256,15 @@ def most_relative(one: Floats, other: Floats) -> float:
 
 def _drawn(lit: Flags, label: Indices, count: int) -> Indices:
     """Random texels among those that viewers see."""
-    from lambent.bake.surfaces.texels import BEYOND
+    from lambent.baking.surfaces.texels import BEYOND
 
     seen = np.flatnonzero(lit & (label < BEYOND))
     return np.sort(np.random.default_rng(SEED).permutation(seen)[:count])
 
 
 def _context(store: Store) -> BakeContext:
-    from lambent.bake.engine import engine
-    from lambent.bake.quality import quality_named
+    from lambent.baking.engine import engine
+    from lambent.baking.quality import quality_named
     from lambent.store.source import scene_of
 
     engine()

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from lambent.bake.quality import Quality, quality_named
+from lambent.baking.quality import Quality, quality_named
 from lambent.core.light.colour import luminance
 from lambent.core.progress import Cancelled, Progress, silent
 from lambent.scenes import load_scene
@@ -131,13 +131,13 @@ class Bakes:
     folder: Path
 
     def __post_init__(self) -> None:
-        from lambent.bake.bake import found
+        from lambent.baking.bake import found
 
         if needs := found()[self.case.kind].NEEDS:
             self._bake("ready", only=needs)
 
     def _bake(self, name: str, only: Sequence[str] = (), progress: Progress = silent, seed: int = 0) -> Store:
-        from lambent.bake.bake import bake
+        from lambent.baking.bake import bake
 
         return bake(
             self.scene, self.folder / name, quality=self.quality, only=only or (self.case.kind,), progress=progress,
@@ -207,7 +207,7 @@ def _size(store: Store, case: Case) -> tuple[int, int]:
 
 def _scaled(scene: Scene, effort: Effort, factor: float, folder: Path) -> dict[str, Any]:
     """Seconds of the main row with `factor` times its texels."""
-    from lambent.bake.artefacts import geometry
+    from lambent.baking.artefacts import geometry
 
     case = next(case for case in CASES if case.artefact == MAIN)
     texels = round(effort.quality.settings("geometry", geometry.SETTINGS).texels * factor**0.5)

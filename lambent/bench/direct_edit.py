@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from lambent.bake.bake import bake
-from lambent.bake.quality import quality_named
-from lambent.bake.transport.view import View
+from lambent.baking.bake import bake
+from lambent.baking.quality import quality_named
+from lambent.baking.transport.view import View
 from lambent.bench.measuring.reference import Reference, path_traced
 from lambent.bench.measuring.sum_over_lights import errors_of_sums
 from lambent.core.arrays import Flags, Floats
@@ -91,7 +91,7 @@ QUICK = Effort(64, (400,), frames=8, edits=50, reference_spp=256, rival_s=2.0, c
 
 def run(effort: Effort, progress: Progress = silent) -> dict[str, Any]:
     """Rows per scene and number of lights; the summary has figures common to all."""
-    from lambent.bake.engine import engine
+    from lambent.baking.engine import engine
 
     engine()
     rows = []
@@ -256,7 +256,7 @@ def _against_path_tracing(
     scene: Scene, pictures: list[Floats], shown: Flags, effort: Effort
 ) -> Iterator[dict[str, Any]]:
     """Errors of edited pictures, and the time of path tracing with a denoiser for the same error."""
-    from lambent.bake.reference.path_traced import tracer_of
+    from lambent.baking.reference.path_traced import tracer_of
 
     view = tracer_of(scene, max_depth=1), scene.cameras[0], (effort.size, effort.size)
     halves = [path_traced(*view, effort.reference_spp // 2, seed).mean() for seed in (1, 2)]

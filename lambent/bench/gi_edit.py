@@ -29,10 +29,10 @@ from typing import Any
 
 import numpy as np
 
-from lambent.bake.bake import bake
-from lambent.bake.interreflection.settings import Bounces
-from lambent.bake.quality import quality_named
-from lambent.bake.transport.view import View
+from lambent.baking.bake import bake
+from lambent.baking.interreflection.settings import Bounces
+from lambent.baking.quality import quality_named
+from lambent.baking.transport.view import View
 from lambent.bench.direct_edit import MIB, drag, held_bytes
 from lambent.bench.measuring.reference import path_traced
 from lambent.bench.scenes.gi_edit_states import KINDS, flip_between, interior, relative_mse, setting, summed_up
@@ -113,7 +113,7 @@ def run(effort: Effort, settings: int | None = None, progress: Progress = silent
 
     `settings` overrides the effort's number of random settings per row.
     """
-    from lambent.bake.engine import engine
+    from lambent.baking.engine import engine
 
     if settings is not None:
         if settings < 1:
@@ -178,7 +178,7 @@ class _Room:
 
     def reference(self, materials: dict[str, Editable], surfaces: int, spp: int) -> tuple[Floats, Floats]:
         """A path traced picture in two halves."""
-        from lambent.bake.reference.path_traced import render_reference
+        from lambent.baking.reference.path_traced import render_reference
 
         edited = {name: one for name, one in materials.items() if name not in self.fixed}
         return tuple(
@@ -305,7 +305,7 @@ def _rival(
     room: _Room, large: _Room, state: dict[str, Editable], converged: Floats, wanted: float, effort: Effort
 ) -> dict[str, Any]:
     """The fewest samples that reach the error in the small view, and their seconds in the large one."""
-    from lambent.bake.reference.path_traced import tracer_of
+    from lambent.baking.reference.path_traced import tracer_of
 
     edited = {name: one for name, one in state.items() if name not in room.fixed}
     depth = len(room.case.series)

@@ -122,8 +122,8 @@ def _row(name: str, runs: list[tuple[float, float | None]], gpu_mb: float | None
 
 def _box(folder: Path, progress: Progress) -> Path:
     """The built-in box, baked coarsely: its texel values do not matter here."""
-    from lambent.bake.bake import bake
-    from lambent.bake.quality import quality_named
+    from lambent.baking.bake import bake
+    from lambent.baking.quality import quality_named
     from lambent.scenes import load_scene
 
     coarse = quality_named("preview").changed("coarse", geometry={"texels": 128})

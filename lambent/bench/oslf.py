@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from lambent.bake.quality import Quality
 from lambent.baked.light_fields import lookup as look
 from lambent.baked.light_fields.blocks.blocks import in_blocks
 from lambent.baked.light_fields.light_field import NO_POINT, LightField, Sky
 from lambent.baked.light_fields.lookup import March, Place
 from lambent.baked.light_fields.maps import radiance_along
+from lambent.baking.quality import Quality
 from lambent.bench.measuring.light_field_caches import caches
 from lambent.bench.scenes.light_field_view import Compared, LightFieldView
 from lambent.core.arrays import Floats

@@ -46,12 +46,12 @@ def run(effort: Effort, progress: Progress = silent) -> dict[str, Any]:
 
 
 def _rows(name: str, count: int, effort: Effort) -> list[dict[str, Any]]:
-    from lambent.bake.engine import engine
+    from lambent.baking.engine import engine
 
     engine()
-    from lambent.bake.tracing.scene_builder import SceneBuilder
-    from lambent.bake.transport.view_points import view_points
-    from lambent.bake.transport.visibility import visibility
+    from lambent.baking.tracing.scene_builder import SceneBuilder
+    from lambent.baking.transport.view_points import view_points
+    from lambent.baking.transport.visibility import visibility
     from lambent.published.visibility import VARIANTS, Predicted, predicted_visibility
 
     case, size = CASES[name], effort.size

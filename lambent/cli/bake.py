@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from lambent.bake import artefacts
-from lambent.bake.interreflection.settings import Bounces
-from lambent.bake.methods import LightGroupMethod, LightMapMethod, ProbeMethod
-from lambent.bake.quality import QualityName
+from lambent.baking import artefacts
+from lambent.baking.interreflection.settings import Bounces
+from lambent.baking.methods import LightGroupMethod, LightMapMethod, ProbeMethod
+from lambent.baking.quality import QualityName
 from lambent.cli.console import CreaseAngle, Json, progress_bar, say, show, table
 from lambent.core.discovery import known, modules_in, names_in
 from lambent.core.errors import UserError
@@ -21,8 +21,8 @@ from lambent.core.errors import UserError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from lambent.bake.interreflection.proposal import Proposal
-    from lambent.bake.running.workers import Workers
+    from lambent.baking.interreflection.proposal import Proposal
+    from lambent.baking.running.workers import Workers
     from lambent.core.progress import Progress
     from lambent.editing.interreflection.noise import PassNoise
     from lambent.editing.session.document import SessionDocument
@@ -127,8 +127,8 @@ def command(
 
     Example: lambent bake builtin:cornell --view front:450x450 --samples 4096 --propose
     """
-    from lambent.bake.bake import bake
-    from lambent.bake.light_fields.request import light_fields_of
+    from lambent.baking.bake import bake
+    from lambent.baking.light_fields.request import light_fields_of
     from lambent.editing.session.session import Session
     from lambent.scenes import load_scene
     from lambent.scenes.scene import SunSky
@@ -248,8 +248,8 @@ def _proposed(
     """Scene and bounces from the store, or as proposed; a proposal is printed on stderr before the bake."""
     from dataclasses import replace
 
-    from lambent.bake.interreflection.proposal import held_by, propose_all
-    from lambent.bake.interreflection.series import used_materials
+    from lambent.baking.interreflection.proposal import held_by, propose_all
+    from lambent.baking.interreflection.series import used_materials
 
     views, light = edited["views"], edited.get("environment")
     if not views:
@@ -273,7 +273,7 @@ def _proposed(
 
 def _watch(scene: Scene, store: Path, bounces: Bounces, edited: dict[str, Any], progress: Progress) -> PassNoise:
     """The recorder of the noise of interreflections in the store."""
-    from lambent.bake.interreflection.series import used_materials
+    from lambent.baking.interreflection.series import used_materials
     from lambent.editing.interreflection.noise import PassNoise
     from lambent.materials.factored.of_lobes import of_material
 
@@ -289,7 +289,7 @@ def _workers(count: int | None, address: str | None, unused: bool) -> AbstractCo
         raise UserError("--workers and --cluster exclude each other", field="--cluster", hint="leave out one")
     if unused or (count is None and address is None):
         return nullcontext()
-    from lambent.bake.running.cluster import opened
+    from lambent.baking.running.cluster import opened
 
     return opened(count, address)
 
@@ -298,7 +298,7 @@ def _edited(
     scene: Scene, store: Path | None, names: list[str], session: Session | None
 ) -> tuple[dict[str, Any], frozenset[str]]:
     """Arguments of `bake` for the named views or a session's view, and the names of the edited materials."""
-    from lambent.bake.transport.view import View, view_named
+    from lambent.baking.transport.view import View, view_named
     from lambent.store.kept.views import read_views
 
     saved = read_views(store).cameras if store is not None else ()

@@ -101,7 +101,7 @@ def command(json: Json = False) -> None:
 
 
 def _path_tracer() -> tuple[bool, str]:
-    from lambent.bake.engine import MEND, probe_engine
+    from lambent.baking.engine import MEND, probe_engine
 
     probe = probe_engine()
     engine = probe.engine

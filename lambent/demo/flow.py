@@ -23,9 +23,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from lambent.bake.bake import bake
-from lambent.bake.quality import Quality, quality_named
-from lambent.bake.reference.goniophotometer import measure
+from lambent.baking.bake import bake
+from lambent.baking.quality import Quality, quality_named
+from lambent.baking.reference.goniophotometer import measure
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
 from lambent.core.light.colour import srgb_decode
@@ -196,7 +196,7 @@ class Flow:
 
     def compare(self, scene: Scene) -> None:
         """Compare one view in motion, at rest, and path traced."""
-        from lambent.bake.reference.path_traced import (
+        from lambent.baking.reference.path_traced import (
             render_reference,  # imports Mitsuba, whose variant is set by the bake
         )
 

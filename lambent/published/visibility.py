@@ -1,7 +1,7 @@
 """Visibility of distant lights by coherence, predicted from nearby pixels, with shadow rays where that is doubtful.
 
 Ben-Artzi 2007, chapter 8 (Ben-Artzi, Ramamoorthi and Agrawala 2006). It traces few rays, but a ray of a modern tracer
-costs less than a prediction (docs/performance.md), so `bake.transport.visibility` traces all of them. Lights are at
+costs less than a prediction (docs/performance.md), so `baking.transport.visibility` traces all of them. Lights are at
 infinity; their cells are the directions nearest to each, that is, Voronoi cells on the sphere.
 
 Pixels are evaluated in passes, whose pixels are independent of each other (section 8.6.1 and figure 8.4). Informing
@@ -20,9 +20,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.running.tiles import slices
-from lambent.bake.tracing.rays import array_of, has_holes, in_shadow, intersect, leaving, vectors
-from lambent.bake.transport.view_points import ViewPoints
+from lambent.baking.running.tiles import slices
+from lambent.baking.tracing.rays import array_of, has_holes, in_shadow, intersect, leaving, vectors
+from lambent.baking.transport.view_points import ViewPoints
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.geometry.octahedral import texel_directions, to_square
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.bake.artefacts.visibility import SETTINGS
+from lambent.baking.artefacts.visibility import SETTINGS
 from lambent.core.arrays import Image
 from lambent.core.errors import UserError
 from lambent.core.pictures.images import WRITABLE, check_writable

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from lambent.bake.running.again import rebaked_copy
 from lambent.baked.answering.stored import NO_ANSWER
+from lambent.baking.running.again import rebaked_copy
 from lambent.core.arrays import Floats
 from lambent.core.interruption import is_interruption
 from lambent.core.light.light_mix import WHITE, MixTrack

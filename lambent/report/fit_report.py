@@ -124,12 +124,12 @@ def _previews(
     """The two preview balls and their difference, or the reason why they are missing."""
     try:
         with needing_extras():
-            from lambent.bake.engine import engine
+            from lambent.baking.engine import engine
 
             engine()
     except UserError as error:
         return [page.note("No previews", [f"The measurement and the model are not shown on a ball: {error}"])]
-    from lambent.bake.reference.material_preview import DAYLIGHT, preview
+    from lambent.baking.reference.material_preview import DAYLIGHT, preview
 
     seen = preview(table, material, environment or DAYLIGHT, progress=progress)
     file = getattr(environment, "file", None)

@@ -24,8 +24,8 @@ from lambent.store.lamp_discs import axes_of
 from lambent.store.store import Store
 
 if TYPE_CHECKING:
-    from lambent.bake.pictures.tracer import LightMap
-    from lambent.bake.tracing.traced_scene import TracedScene
+    from lambent.baking.pictures.tracer import LightMap
+    from lambent.baking.tracing.traced_scene import TracedScene
     from lambent.realtime.answering.answering import AnsweredLight, Lit
 
 Textures = Mapping[str, MaterialTextures | None]  # exchanged ones, by material
@@ -92,7 +92,7 @@ class StoredLight:
     @cached_property
     def _change(self) -> NDArray[np.float32]:
         """The change of direct light (G, T, 3) on the answering texels, by shadow maps of the edited lamps."""
-        from lambent.bake.light.lamp_maps import shadow_map  # imports Mitsuba, whose variant `engine` has set
+        from lambent.baking.light.lamp_maps import shadow_map  # imports Mitsuba, whose variant `engine` has set
         from lambent.realtime.lamps.changed import changed  # imports what draws
 
         pairs, drawn = [], self._baked.lamps
@@ -115,7 +115,7 @@ class StoredLight:
         return AnsweredLight(self._baked, read_answer(self._store))
 
     def _without_lamps(self, maps: Sequence[Floats | None], factors: Floats | None) -> LightMap:
-        from lambent.bake.pictures.tracer import LightMap  # imports Mitsuba, whose variant `engine` has set
+        from lambent.baking.pictures.tracer import LightMap  # imports Mitsuba, whose variant `engine` has set
 
         front, back = map(self._in_watts, maps)
         if self._lamps is None:

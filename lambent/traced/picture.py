@@ -19,7 +19,7 @@ from lambent.core.light.colour import luminance
 from lambent.core.views.camera import Camera
 
 if TYPE_CHECKING:
-    from lambent.bake.pictures.tracer import Kind, Tracer
+    from lambent.baking.pictures.tracer import Kind, Tracer
 
 Image = NDArray[np.float32]
 ENDED = 16  # samples of the first kind
@@ -53,7 +53,7 @@ class TracedPicture:
         self, tracer: Tracer, camera: Camera, size: tuple[int, int], *, seed: int = 0, path: bool = False,
         part: str = "full",
     ) -> None:  # fmt: skip
-        from lambent.bake.pictures.tracer import Kind, Part  # imports Mitsuba, whose variant `engine` has set
+        from lambent.baking.pictures.tracer import Kind, Part  # imports Mitsuba, whose variant `engine` has set
 
         self._tracer, self._camera, self.size, self._seed, self.path = tracer, camera, size, seed, path
         self._part = Part(part)
@@ -103,7 +103,7 @@ class TracedPicture:
 
     def denoised(self, *, fast: bool = False) -> Image:
         """The mean, denoised by Open Image Denoise with albedo and normals."""
-        from lambent.bake.light.denoise import denoise_image
+        from lambent.baking.light.denoise import denoise_image
 
         return np.asarray(denoise_image(self.mean(), *self.guides(), fast=fast), np.float32)
 
@@ -126,7 +126,7 @@ class TracedPicture:
         if floor <= 0:
             return 0.0
         if denoised:
-            from lambent.bake.light.denoise import denoise_image
+            from lambent.baking.light.denoise import denoise_image
 
             guides = [self._parts(guide) for guide in self.guides()]
             halves = [denoise_image(self._parts(half), *guides, fast=True) for half in halves]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lambent.bake.engine import engine
+from lambent.baking.engine import engine
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.light.light_mix import Factors, factors_of
@@ -29,8 +29,8 @@ from lambent.store.store import Store
 from lambent.traced.light import StoredLight
 
 if TYPE_CHECKING:
-    from lambent.bake.pictures.tracer import Tracer
-    from lambent.bake.tracing.traced_scene import TracedScene
+    from lambent.baking.pictures.tracer import Tracer
+    from lambent.baking.tracing.traced_scene import TracedScene
 
 LIGHT_MAP = f"light_map/{SIDES[0]}"
 
@@ -98,8 +98,8 @@ class TracedRoom:
 
         The error is at most `limit` times the illuminance where 262,144 samples suffice for that.
         """
-        from lambent.bake.pictures.irradiance import illuminance  # imports Mitsuba, whose variant `engine` has set
-        from lambent.bake.tracing.solids import SolidTest
+        from lambent.baking.pictures.irradiance import illuminance  # imports Mitsuba, whose variant `engine` has set
+        from lambent.baking.tracing.solids import SolidTest
 
         traced, normals = self._traced, np.broadcast_to(normal, points.shape)
         free = ~SolidTest(traced.builder(diffuse=False), traced.whole(diffuse=False)).embedded(points, normals)
@@ -115,7 +115,7 @@ class TracedRoom:
     @property
     def tracer(self) -> Tracer:
         """Samples of pictures in the present state."""
-        from lambent.bake.pictures.tracer import Tracer  # imports Mitsuba, whose variant `engine` has set
+        from lambent.baking.pictures.tracer import Tracer  # imports Mitsuba, whose variant `engine` has set
 
         if self._tracer is None and self._light is not None:
             textures = {name: textures_in_look(name, look, self._scene.textures) for name, look in self._looks.items()}
@@ -138,7 +138,7 @@ def room_of_store(
     stays as baked, or answers lamps. What the store's light needs is taken from a room of it `before`, which ends.
     """
     engine()
-    from lambent.bake.pictures.stored import stored_scene  # imports Mitsuba, whose variant `engine` has set
+    from lambent.baking.pictures.stored import stored_scene  # imports Mitsuba, whose variant `engine` has set
 
     folder = TemporaryDirectory()
     lit = under_turned_sky(_as_drawn(with_lamp_edits(scene, lamps)), sky_turn_deg, Path(folder.name))
@@ -151,7 +151,7 @@ def room_of_store(
 def room_of_paths(scene: Scene, *, sky_turn_deg: float = 0.0, replacements: Sequence[Replacement] = ()) -> TracedRoom:
     """A scene for whole paths, without a light map."""
     engine()
-    from lambent.bake.pictures.stored import scene_alone  # imports Mitsuba, whose variant `engine` has set
+    from lambent.baking.pictures.stored import scene_alone  # imports Mitsuba, whose variant `engine` has set
 
     folder = TemporaryDirectory()
     lit = under_turned_sky(_as_drawn(with_replacements(scene, replacements)), sky_turn_deg, Path(folder.name))

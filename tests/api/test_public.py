@@ -20,6 +20,7 @@ from tests.viewer.editor.measured_specimens import BRASS, write_measurement
 HEAVY = ("numpy", "scipy", "mitsuba", "drjit", "wgpu", "imgui_bundle", "matplotlib", "zarr", "numba", "typer", "rich")
 # Changing a line here changes what users' scripts rely on: see CONTRIBUTING.md, "Public names".
 SIGNATURES = """
+bake(scene, folder, *, quality, progress, **options)
 compare(reference, test)
 open(folder)
 read(file, *, reconstruction, crease_deg)
@@ -197,7 +198,7 @@ def test_a_store_is_rendered_with_edits(adapter, baked_box, tmp_path):
 
 
 def test_a_scene_is_baked_and_illuminance_traced(tmp_path):
-    store = lambent.read("builtin:box").bake(tmp_path / "box.store", only={"light_map"}, progress=False)
+    store = lambent.bake("builtin:box", tmp_path / "box.store", only={"light_map"}, progress=False)
     assert isinstance(store, lambent.Store) and store.folder == tmp_path / "box.store"
     (floor,) = store.illuminance(over="floor", spacing_m=0.4, margin_m=0.1, error=0.05)
     assert floor.facts()["mean_lx"] > 0 and floor.lx.shape == floor.error_lx.shape

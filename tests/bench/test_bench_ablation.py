@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from lambent.bake.bake import bake
-from lambent.bake.light import sampling
-from lambent.bake.quality import quality_named
+from lambent.baking.bake import bake
+from lambent.baking.light import sampling
+from lambent.baking.quality import quality_named
 from lambent.bench.measuring.switches import BAKE, SWITCHES, TRACE, Switch, is_frozen, switched
 from lambent.bench.pictures import ablation
 from lambent.core.errors import UserError
@@ -21,7 +21,7 @@ from lambent.scenes import load_scene
 COARSE = quality_named("preview").changed("coarse", geometry={"texels": 64}, environment={"texels": 32})
 WHITE = Switch("colour.wgsl:srgb_encode", "    return vec3f(1.0);")
 UNREAD = Switch("lambent.realtime.overlays.outline.REACH_PX", 7)
-FROZEN = Switch("lambent.bake.surfaces.clusters.MIXED", 0.0)
+FROZEN = Switch("lambent.baking.surfaces.clusters.MIXED", 0.0)
 
 
 def test_a_name_changes_wherever_it_was_imported() -> None:
@@ -84,7 +84,7 @@ def store(tmp_path_factory):
 @pytest.mark.usefixtures("adapter")
 def test_rows_say_what_changes(store):
     noisy = Switch("lambent.traced.picture.ENDED", 0, TRACE)
-    darker = Switch("lambent.bake.light.sampling.closed", lambda *given: 0.5 * before(*given), BAKE)
+    darker = Switch("lambent.baking.light.sampling.closed", lambda *given: 0.5 * before(*given), BAKE)
     before = sampling.closed
     effort = replace(ablation.QUICK, width=64, height=48, truth_spp=16, quality=COARSE,
                      switches=(WHITE, UNREAD, FROZEN, noisy, darker))  # fmt: skip

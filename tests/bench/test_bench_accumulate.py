@@ -10,8 +10,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
-from lambent.bake.quality import quality_named
+from lambent.baking.bake import bake
+from lambent.baking.quality import quality_named
 from lambent.bench.measuring.reference import Reference
 from lambent.bench.pictures import accumulate, edits
 from lambent.scenes import load_scene

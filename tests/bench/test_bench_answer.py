@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from lambent.bake.bake import bake
-from lambent.bake.quality import quality_named
+from lambent.baking.bake import bake
+from lambent.baking.quality import quality_named
 from lambent.bench import answer
 from lambent.bench.measuring import answer_times
 from lambent.core.errors import UserError

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lambent.bench import bake as bench
 from lambent.store.store import Store
-from tests.bake.small_scenes import TINY, room_with_step
+from tests.baking.small_scenes import TINY, room_with_step
 
 
 def test_interrupted_bake_is_finished_all_the_same(tmp_path: Path) -> None:

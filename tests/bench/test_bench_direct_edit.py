@@ -38,10 +38,10 @@ def test_rows_of_a_scene_and_of_the_full_frame(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_the_rival_comes_closer_with_more_samples() -> None:
-    from lambent.bake.engine import engine
+    from lambent.baking.engine import engine
 
     engine()
-    from lambent.bake.reference.path_traced import tracer_of
+    from lambent.baking.reference.path_traced import tracer_of
     from lambent.scenes import load_scene
 
     scene = load_scene("builtin:teatray")

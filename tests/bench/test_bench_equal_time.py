@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
-from lambent.bake.quality import quality_named
+from lambent.baking.bake import bake
+from lambent.baking.quality import quality_named
 from lambent.bench.pictures import equal_time
 from lambent.bench.registry import run_bench
 from lambent.core.errors import UserError

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
-from lambent.bake.engine import engine
-from lambent.bake.quality import quality_named
+from lambent.baking.bake import bake
+from lambent.baking.engine import engine
+from lambent.baking.quality import quality_named
 from lambent.bench.measuring.reprojection import reprojected
 from lambent.bench.pictures import flicker
 from lambent.core.views.camera import Camera, pixel_rays
@@ -26,7 +26,7 @@ AFTER = Camera("after", (0.13, 0.05, 1.9), (0.1, 0.0, 0.0))
 
 def surfaces(mesh: Mesh) -> Any:
     engine()
-    from lambent.bake.reference.surfaces import Surfaces
+    from lambent.baking.reference.surfaces import Surfaces
 
     return Surfaces(mesh.positions, mesh.faces)
 

@@ -16,8 +16,8 @@ SIZE, LIGHTS = 33, 50
 
 def test_rows_are_counted_by_hand(mi: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Rays are counted where they are traced; the truth is asked of Mitsuba's scene itself, ray by ray."""
-    from lambent.bake.tracing.scene_builder import SceneBuilder
-    from lambent.bake.transport.view_points import view_points
+    from lambent.baking.tracing.scene_builder import SceneBuilder
+    from lambent.baking.transport.view_points import view_points
     from lambent.published import visibility as predicted
     from lambent.published.visibility import ShadowRays
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from lambent.bake import bake as baking
-from lambent.bake.quality import quality_named
+from lambent.baking import bake as baking
+from lambent.baking.quality import quality_named
 from lambent.demo.flow import DRAFT, SPECIMEN_OF
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.inspecting.synthetic import Setup, synthesise

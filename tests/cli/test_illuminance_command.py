@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
+from lambent.baking.bake import bake
 from lambent.core.outputs import is_marked
 from lambent.scenes import load_scene
 from lambent.store.store import Store
-from tests.bake.small_scenes import TINY
+from tests.baking.small_scenes import TINY
 from tests.traced.lit_grids import CANDELA, PLANE, VERTICAL_DEG, lux_from, write_hall
 
 pytestmark = [pytest.mark.usefixtures("mi"), pytest.mark.slow]

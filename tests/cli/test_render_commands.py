@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lambent.bake.bake import bake
+from lambent.baking.bake import bake
 from lambent.core.light.false_colour import Range, false_colour
 from lambent.core.light.photometry import LM_PER_W, photometric
 from lambent.core.pictures.images import read_encoded, read_image, write_image
@@ -25,7 +25,7 @@ from lambent.scenes import load_scene
 from lambent.scenes.geometry import placed, sphere
 from lambent.scenes.scene import Look, Scene, SceneObject, Variant
 from lambent.store.store import Store
-from tests.bake.small_scenes import TINY, room_with_step
+from tests.baking.small_scenes import TINY, room_with_step
 from tests.cli.edited_floor import SIZE, saved, write_floor
 from tests.viewer.small_store import write_small_store
 

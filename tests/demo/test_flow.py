@@ -11,7 +11,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 
-from lambent.bake.quality import quality_named
+from lambent.baking.quality import quality_named
 from lambent.core.pictures.images import read_encoded
 from lambent.core.progress import Cancelled, silent
 from lambent.demo.flow import PACE_M_S, SPECIMEN_OF, STILLS, Effort, Flow, walked

@@ -14,7 +14,7 @@ from lambent.core.views.camera import Camera
 from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.scenes.sky.triangle_lights import TriangleLights, environment_triangles
-from tests.bake.small_scenes import GREY
+from tests.baking.small_scenes import GREY
 
 OUTSIDE = -1
 
@@ -87,9 +87,9 @@ def ball_and_box() -> Scene:
 @pytest.fixture(scope="module")
 def view(mi: Any) -> tuple[Any, Any, TriangleLights, Flags]:
     """The traced scene, the points of its view, whose corners show no surface, the lights, and which are seen."""
-    from lambent.bake.tracing.scene_builder import SceneBuilder
-    from lambent.bake.transport.view_points import view_points
-    from lambent.bake.transport.visibility import visibility
+    from lambent.baking.tracing.scene_builder import SceneBuilder
+    from lambent.baking.transport.view_points import view_points
+    from lambent.baking.transport.visibility import visibility
 
     w = lat_long_directions(48, 96).reshape(-1, 3)
     weight = np.repeat(-np.diff(np.cos(np.linspace(0, np.pi, 49))), 96) * np.pi / 48

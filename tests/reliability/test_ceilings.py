@@ -133,7 +133,7 @@ def _raw_opens() -> Iterator[str]:
 
 
 OWN_FILES = {
-    "bake/engine.py: file.read_text": "the cache of what Mitsuba can do here",
+    "baking/engine.py: file.read_text": "the cache of what Mitsuba can do here",
     "core/pictures/exr.py: open": "the null device",
     "core/files.py: beside.open": "a file that is being written",
     "core/files.py: os.open": "a file that is about to be written",

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
+from lambent.baking.bake import bake
 from lambent.core.pictures.images import read_image
 from lambent.core.pictures.metrics import flip_error
 from lambent.core.views.camera import Camera
 from lambent.render import Settings, still
 from lambent.store.store import Store
-from tests.bake.small_scenes import TINY
+from tests.baking.small_scenes import TINY
 from tests.render.lens_room import FRONT, OBLIQUE, Lens
 
 LENS, PIXELS = Lens(1.0, 0.01), 96

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
+from lambent.baking.bake import bake
 from lambent.cli.main import run
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
@@ -32,7 +32,7 @@ from lambent.viewer.modes.walk.at_rest.traced import _wish_of
 from lambent.viewer.modes.walk.at_rest.tracing_worker import Rooms
 from lambent.viewer.modes.walk.mode import WalkMode, open_store
 from lambent.viewer.screen import Rect, Screen
-from tests.bake.small_scenes import TINY
+from tests.baking.small_scenes import TINY
 from tests.viewer.conftest import Clock
 from tests.viewer.drawn_frames import drawn
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
+from lambent.baking.bake import bake
 from lambent.core.errors import UserError
 from lambent.core.light.light_mix import parse_light
 from lambent.core.pictures.images import read_image
@@ -19,7 +19,7 @@ from lambent.scenes import load_scene
 from lambent.store.contract import scene_record
 from lambent.store.source import SOURCE
 from lambent.store.store import Store
-from tests.bake.small_scenes import TINY
+from tests.baking.small_scenes import TINY
 
 pytestmark = [pytest.mark.usefixtures("mi"), pytest.mark.slow]
 TRACED = Settings(48, 32, samples=16)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
+from lambent.baking.bake import bake
 from lambent.core.errors import UserError
 from lambent.core.light.light_mix import GroupMix, LightMix, parse_light
 from lambent.core.pictures.images import read_encoded, read_image, write_shown
@@ -25,7 +25,7 @@ from lambent.store.kept.session import FILE, RoomState, WalkSession, write_sessi
 from lambent.store.kept.states import variants_of
 from lambent.store.kept.views import Views, change_views
 from lambent.store.store import Store
-from tests.bake.small_scenes import TINY, room_with_step
+from tests.baking.small_scenes import TINY, room_with_step
 from tests.viewer.small_store import MATERIALS, with_light_groups, write_small_store
 
 WITHIN = Camera("in", (1.4, 1.2, -1.4), (-0.8, 0.5, 0.0), fov_y_deg=70)

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lambent.bake import engine as engine_module
-from lambent.bake.reference import material_preview
+from lambent.baking import engine as engine_module
+from lambent.baking.reference import material_preview
 from lambent.core.errors import UserError
 from lambent.core.progress import Cancelled
 from lambent.materials.document import Lobe, Material

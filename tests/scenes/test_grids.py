@@ -14,7 +14,7 @@ from lambent.scenes.geometry import box, merge, patch, placed
 from lambent.scenes.grids import Grid
 from lambent.scenes.loaders.scene_toml.grids import GridSection, cells_of
 from lambent.scenes.scene import SceneObject
-from tests.bake.small_scenes import turned_inwards
+from tests.baking.small_scenes import turned_inwards
 from tests.scenes.loaders.test_toml import MATERIALS, written
 
 SHELL = SceneObject("shell", placed(turned_inwards(box((6, 3, 4))), (0, 1.5, 0)), "grey")

@@ -91,7 +91,7 @@ def test_a_member_that_fits_nothing_is_an_error(tmp_path):
 
 
 def test_names_do_not_change_the_light():
-    from lambent.bake.running.keys import group_inputs, light_inputs
+    from lambent.baking.running.keys import group_inputs, light_inputs
 
     plain, named = scene_of(point("")), scene_of(point("bulb"))
     assert light_inputs(plain) == light_inputs(named) and group_inputs(plain) != group_inputs(named)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
+from lambent.baking.bake import bake
 from lambent.core.light.glare import glare
 from lambent.core.light.photometry import LM_PER_W, photometric
 from lambent.core.views.panorama import Panorama
@@ -20,7 +20,7 @@ from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, Scene, S
 from lambent.store.store import Store
 from lambent.traced.picture import TracedPicture
 from lambent.traced.room import TracedRoom, room_of_paths, room_of_store
-from tests.bake.small_scenes import BLACK, GREY, TINY, furnace, plane
+from tests.baking.small_scenes import BLACK, GREY, TINY, furnace, plane
 from tests.traced.lit_grids import CANDELA, PLANE, VERTICAL_DEG, lux_from, write_hall
 from tests.traced.test_traced_pictures import WIDE, lit_room
 
@@ -49,8 +49,8 @@ def by_paths(
     """Lx (n,) and their standard errors by whole paths alone, without a light map."""
     import mitsuba as mi
 
-    from lambent.bake.tracing.path_tracer import Points, irradiance
-    from lambent.bake.tracing.rays import block_sums, independent, vectors
+    from lambent.baking.tracing.path_tracer import Points, irradiance
+    from lambent.baking.tracing.rays import block_sums, independent, vectors
 
     traced = room_of_paths(scene)._traced
     places = vectors(mi.Point3f, points.repeat(samples, axis=0))

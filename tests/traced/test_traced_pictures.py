@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
+from lambent.baking.bake import bake
 from lambent.core.errors import UserError
 from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
@@ -19,7 +19,7 @@ from lambent.scenes.scene import ConstantEnvironment, PointLight, Scene, SceneOb
 from lambent.store.store import Store
 from lambent.traced.picture import TracedPicture
 from lambent.traced.room import TracedRoom, room_of_paths, room_of_store
-from tests.bake.small_scenes import TINY, furnace, plane, turned_inwards
+from tests.baking.small_scenes import TINY, furnace, plane, turned_inwards
 
 pytestmark = [pytest.mark.usefixtures("mi"), pytest.mark.slow]
 SIZE = (24, 16)
@@ -173,7 +173,7 @@ def test_more_samples_have_less_noise_and_seeds_differ(room: TracedRoom) -> None
 
 
 def test_bands_of_a_large_picture_are_the_picture(room: TracedRoom, monkeypatch: pytest.MonkeyPatch) -> None:
-    from lambent.bake.pictures import tracer
+    from lambent.baking.pictures import tracer
 
     whole = traced(room, 4)
     monkeypatch.setattr(tracer, "RAYS_AT_ONCE", 100)

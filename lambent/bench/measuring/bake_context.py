@@ -11,18 +11,18 @@ from lambent.scenes.scene import Scene
 from lambent.store.store import Store
 
 if TYPE_CHECKING:
-    from lambent.bake.context import BakeContext
-    from lambent.bake.quality import Quality
+    from lambent.baking.context import BakeContext
+    from lambent.baking.quality import Quality
 
 
 def context_of(store: Store, scene: Scene, quality: Quality, progress: Progress = silent) -> BakeContext:
     """The bake context of a store and its scene, as far as geometry and light map need it; the engine is chosen."""
-    from lambent.bake.bake import found
-    from lambent.bake.context import BakeContext
-    from lambent.bake.methods import METHODS
-    from lambent.bake.probes.division import divided
-    from lambent.bake.surfaces.cuts import cut_for_viewers
-    from lambent.bake.surfaces.visible_triangles import TriangleVisibility
+    from lambent.baking.bake import found
+    from lambent.baking.context import BakeContext
+    from lambent.baking.methods import METHODS
+    from lambent.baking.probes.division import divided
+    from lambent.baking.surfaces.cuts import cut_for_viewers
+    from lambent.baking.surfaces.visible_triangles import TriangleVisibility
 
     ready = replace(scene, textures=prepared(scene.textures))
     as_baked = cut_for_viewers(divided(TriangleVisibility(ready), store, progress), store).scene

@@ -20,7 +20,7 @@ from lambent.core.views.camera import Camera
 from lambent.traced.picture import ENDED, TracedPicture
 
 if TYPE_CHECKING:
-    from lambent.bake.pictures.tracer import Tracer
+    from lambent.baking.pictures.tracer import Tracer
 
 COMPILING = 32, 18  # pixels
 

@@ -10,7 +10,7 @@ from lambent.core.arrays import Flags, Floats
 from lambent.core.views.camera import Camera, clip_from_world, pixel_rays
 
 if TYPE_CHECKING:
-    from lambent.bake.reference.surfaces import Surfaces
+    from lambent.baking.reference.surfaces import Surfaces
 
 NEAR_M = 1e-3
 HIDDEN = 2e-3  # relative distance by which a point may lie behind the surface that the other camera sees

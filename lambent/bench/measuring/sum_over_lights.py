@@ -34,8 +34,8 @@ def errors_of_sums(
 
     The light is an environment's; the material has no textures and reflects.
     """
-    from lambent.bake.transport.view import View
-    from lambent.bake.transport.view_tracer import ViewTracer
+    from lambent.baking.transport.view import View
+    from lambent.baking.transport.view_tracer import ViewTracer
 
     view = session.document
     most = transport_lights(store, view.camera, *view.size)[-1]

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.quality import Quality
+from lambent.baking.quality import Quality
 from lambent.bench.measuring.reference import Truth, compile_kernels, finished, path_traced_parts, with_samples
 from lambent.bench.measuring.switches import BAKE, DRAW, SWITCHES, TRACE, Switch, is_frozen, switched
 from lambent.bench.scenes.views import first_camera, inputs_or_baked
@@ -118,7 +118,7 @@ class View:
             return self.frame(self.store)
         if when == TRACE:
             return self.rest(self.store)
-        from lambent.bake.bake import bake
+        from lambent.baking.bake import bake
 
         baked, bake_s = _timed(lambda: bake(scene_of(self.store), folder, quality=self.effort.quality))
         parts = [self.frame(baked), self.rest(baked)]

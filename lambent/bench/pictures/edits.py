@@ -42,7 +42,7 @@ from lambent.traced.room import TracedRoom, room_of_paths, room_of_store
 from lambent.viewer.cameras.picking import Geometry
 
 if TYPE_CHECKING:
-    from lambent.bake.pictures.tracer import Tracer
+    from lambent.baking.pictures.tracer import Tracer
 
 NAME = "edits"
 T = TypeVar("T")

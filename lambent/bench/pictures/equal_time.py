@@ -42,7 +42,7 @@ from lambent.traced.picture import TracedPicture
 from lambent.traced.room import room_of_paths, room_of_store
 
 if TYPE_CHECKING:
-    from lambent.bake.pictures.tracer import Tracer
+    from lambent.baking.pictures.tracer import Tracer
 
 NAME = "equal-time"
 COMPARED = 0.06  # mean FLIP

@@ -38,7 +38,7 @@ from lambent.traced.picture import TracedPicture
 from lambent.traced.room import room_of_store
 
 if TYPE_CHECKING:
-    from lambent.bake.reference.surfaces import Surfaces
+    from lambent.baking.reference.surfaces import Surfaces
 
 NAME = "flicker"
 CASES = 6
@@ -72,10 +72,10 @@ def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent
 
 def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[dict[str, Any]]:
     """One row per case; FLIP's mean is over all pairs of frames, the worst tile over all."""
-    from lambent.bake.engine import engine
+    from lambent.baking.engine import engine
 
     engine()
-    from lambent.bake.reference import surfaces as geometry  # imports Mitsuba, whose variant is set by `engine`
+    from lambent.baking.reference import surfaces as geometry  # imports Mitsuba, whose variant is set by `engine`
 
     renderer = Renderer(open_device(), store)
     record, scene = renderer.scene.record, renderer.scene

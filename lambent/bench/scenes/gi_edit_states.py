@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lambent.bake.interreflection.series import SMOOTH, SMOOTH_ANGLES
+from lambent.baking.interreflection.series import SMOOTH, SMOOTH_ANGLES
 from lambent.core.arrays import Flags, Floats
 from lambent.core.pictures.metrics import display_exposure, displayed, flip_error
 from lambent.core.plain import triple

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lambent.bake.quality import Quality
 from lambent.baked.light_fields.light_field import NO_POINT, LightField
 from lambent.baked.light_fields.lookup import Place
+from lambent.baking.quality import Quality
 from lambent.bench.measuring.bake_context import context_of
 from lambent.bench.measuring.reference import Reference
 from lambent.core.arrays import Floats, Indices
@@ -29,8 +29,8 @@ from lambent.scenes.scene import Scene
 from lambent.store.contract import sun_left_out
 
 if TYPE_CHECKING:
-    from lambent.bake.context import BakeContext
-    from lambent.bake.reference.mirrored import MirrorTracer, Shown
+    from lambent.baking.context import BakeContext
+    from lambent.baking.reference.mirrored import MirrorTracer, Shown
 
 SEED = 1
 TRUE_PATHS = 16  # for each place of the truth: glossy surfaces scatter light, and one path leaves 1.5 % of a* and b*
@@ -113,8 +113,8 @@ class LightFieldView:
 
     @cached_property
     def _tracer(self) -> MirrorTracer:
-        from lambent.bake.artefacts.light_map import finished_maps
-        from lambent.bake.reference.mirrored import MirrorTracer
+        from lambent.baking.artefacts.light_map import finished_maps
+        from lambent.baking.reference.mirrored import MirrorTracer
 
         return MirrorTracer(self._context.traced, finished_maps(self._context), self._name)
 
@@ -131,8 +131,8 @@ class LightFieldView:
 
     def field(self, points: int, texels: int, strata: int) -> LightField:
         """A light field of the object; points that no pixel shows stay black, which halves the time."""
-        from lambent.bake.light_fields.placing import Placing
-        from lambent.bake.light_fields.sample_map import sample_map
+        from lambent.baking.light_fields.placing import Placing
+        from lambent.baking.light_fields.sample_map import sample_map
 
         traced, context = self._context.traced, self._context
         mesh = context.scene.object(self._name).mesh
@@ -170,7 +170,7 @@ class LightFieldView:
 
 def _lit(scene: Scene, folder: Path, quality: Quality, progress: Progress) -> BakeContext:
     """The context of a bake of the scene's light map."""
-    from lambent.bake.bake import bake
+    from lambent.baking.bake import bake
 
     store = bake(scene, folder, quality=quality, only=("light_map", "environment"), progress=progress)
     return context_of(store, scene, quality, progress)

@@ -96,10 +96,10 @@ def exact_reflection(
 
     `spp` samples of the lobe at every pixel's centre, as in the renderer's `qmc`, each traced to the triangle it hits.
     """
-    from lambent.bake.engine import engine
+    from lambent.baking.engine import engine
 
     engine()
-    from lambent.bake.reference.planar_reflection import ReflectionTracer
+    from lambent.baking.reference.planar_reflection import ReflectionTracer
 
     shapes, dark = meshes(), (0.0, 0.0, 0.0)
     objects = tuple(SceneObject(n, mesh, PAINT, LAMP if n == "lamp" else dark) for n, mesh in shapes.items())

@@ -36,7 +36,7 @@ def path_traced(
     meshes: Mapping[str, Mesh], material: Material, environment: Floats, camera: Camera, size: int, spp: int
 ) -> Floats:
     """Radiance (size, size, 3) of `meshes` in `material` under `environment` (6, N, N, 3), the sky behind them."""
-    from lambent.bake.reference.path_traced import render_reference
+    from lambent.baking.reference.path_traced import render_reference
 
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "environment.exr"

@@ -17,7 +17,7 @@ from lambent.store.store import Store
 @contextmanager
 def inputs_or_baked(inputs: Sequence[Path], scene: str, progress: Progress) -> Iterator[list[Store]]:
     """The inputs, which are baked stores; without inputs, a scene baked here in `preview`."""
-    from lambent.bake.bake import bake
+    from lambent.baking.bake import bake
     from lambent.scenes import load_scene
 
     with tempfile.TemporaryDirectory() as folder:

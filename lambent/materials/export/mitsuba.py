@@ -132,7 +132,7 @@ def _exact(material: Material) -> Any:
     text = ET.tostring(bsdf, encoding="unicode")
     return ET.Comment(
         " Below is an approximation for every Mitsuba. Exact, where Lambent is installed: this in its place, after\n"
-        "  `from lambent.bake.bsdfs.material_plugin import register_material_plugin; register_material_plugin()`.\n"
+        "  `from lambent.baking.bsdfs.material_plugin import register_material_plugin; register_material_plugin()`.\n"
         f"  {text}\n  "
     )
 

@@ -102,7 +102,7 @@ fn arriving(s: Surface, w: vec3f) -> f32 {
 }
 
 // Share of the probe's light, the same for all directions, and light of the niche that occludes the rest (Scaling of
-// bake/probes/selection.py), for the light map's irradiance e.
+// baking/probes/selection.py), for the light map's irradiance e.
 fn in_niche(found: Surface, e: vec3f) -> Surface {
     var s = found;
     let share = specular_occlusion(s.n, e);

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
 from lambent.baked.answering.stored import read_answer
+from lambent.baking.bake import bake
 from lambent.core.arrays import Floats
 from lambent.materials.document import Material
 from lambent.realtime.answering.answering import AnsweredLight
@@ -21,7 +21,7 @@ from lambent.scenes.lamp_edits import LampEdit, with_lamp_edits
 from lambent.scenes.scene import PointLight, Scene, SceneObject
 from lambent.store.lamps import LAMPS
 from lambent.store.store import Store
-from tests.bake.small_scenes import TINY
+from tests.baking.small_scenes import TINY
 
 EDITS = {0: LampEdit((1.2, 2.2, -0.8), (-0.4, -1.0, 0.2)), 1: LampEdit((-1.4, 0.6, 1.2))}
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
 from lambent.baked.answering.stored import read_answer
 from lambent.baked.probes.irradiance import basis_of
+from lambent.baking.bake import bake
 from lambent.core.geometry.directions import normalize
 from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe
@@ -20,7 +20,7 @@ from lambent.realtime.frame_state import FrameState
 from lambent.realtime.light.baked import read_baked
 from lambent.realtime.renderer import Renderer
 from lambent.store.store import Store
-from tests.bake.small_scenes import TINY, room_with_step
+from tests.baking.small_scenes import TINY, room_with_step
 from tests.realtime.answering.answered_scene import answered_scene
 
 VIEW = FrameState(Camera(name="in", position=(1.4, 1.2, -1.4), target=(-0.8, 0.5, 0.0), fov_y_deg=70), 96, 64)

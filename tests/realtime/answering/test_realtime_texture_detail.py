@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lambent.bake.bake import bake
-from lambent.bake.running.again import bake_again
 from lambent.baked.answering.stored import StoredAnswer, read_answer
+from lambent.baking.bake import bake
+from lambent.baking.running.again import bake_again
 from lambent.core.arrays import Floats
 from lambent.realtime.answering.answering import AnsweredLight
 from lambent.realtime.answering.texture_detail import Textures, filtered, with_own_albedos
@@ -20,7 +20,7 @@ from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.looks.image_textures import mean_and_detail, with_image
 from lambent.scenes.scene import ImageTexture, MaterialTextures, Texture
 from lambent.store.store import Store
-from tests.bake.small_scenes import TINY
+from tests.baking.small_scenes import TINY
 
 SCENE = """
 format = "lambent-scene"

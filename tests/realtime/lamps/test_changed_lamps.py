@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
+from lambent.baking.bake import bake
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import normalize
@@ -23,8 +23,8 @@ from lambent.scenes.lamp_edits import LampEdit, edited_lamp
 from lambent.scenes.scene import IesLight, PointLight
 from lambent.store.lamp_discs import directions
 from lambent.store.store import Store
-from tests.bake.light.test_point_lamps import BULB, SPOT, WASHER, intensity, is_behind_plate, room
-from tests.bake.small_scenes import TINY
+from tests.baking.light.test_point_lamps import BULB, SPOT, WASHER, intensity, is_behind_plate, room
+from tests.baking.small_scenes import TINY
 from tests.realtime.lamps.test_drawn_lamps import CAMERA, SIZE, floor_seen
 
 LAMPS = {0: SPOT, 1: BULB, 2: WASHER}  # by number

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
+from lambent.baking.bake import bake
 from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import normalize
 from lambent.core.views.camera import Camera, pixel_rays
@@ -21,8 +21,8 @@ from lambent.realtime.renderer import Renderer
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.store.store import Store
-from tests.bake.light.test_point_lamps import BULB, SPOT, WASHER, intensity, is_behind_plate
-from tests.bake.small_scenes import TINY
+from tests.baking.light.test_point_lamps import BULB, SPOT, WASHER, intensity, is_behind_plate
+from tests.baking.small_scenes import TINY
 
 SIZE = 192
 GLOSSY = Material(kd=0.5, lobes=(Lobe(mx=0.2, my=0.1, r0=(0.2, 0.1, 0.05)),))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
+from lambent.baking.bake import bake
 from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import normalize
 from lambent.core.views.camera import Camera, pixel_rays
@@ -24,7 +24,7 @@ from lambent.scenes.photometry.luminous_surfaces import with_luminous_surfaces
 from lambent.scenes.photometry.opening import Opening
 from lambent.scenes.scene import IesLight, Scene, SceneObject
 from lambent.store.store import Store
-from tests.bake.small_scenes import TINY
+from tests.baking.small_scenes import TINY
 from tests.realtime.lamps.test_drawn_lamps import CAMERA, SIZE, floor_seen
 
 THETA = np.linspace(0, 90, 46)

@@ -169,8 +169,8 @@ def test_bumps_from_afar_look_as_rough_as_they_are(device) -> None:
 
 def test_drawn_images_equal_path_traced_ones(device, mi, tmp_path) -> None:
     """All of a gloss at once - colour, roughness, bumps, brushing, a hole - under light from afar."""
-    from lambent.bake.reference.path_traced import render_reference
-    from lambent.bake.sky.cube import environment_cube
+    from lambent.baking.reference.path_traced import render_reference
+    from lambent.baking.sky.cube import environment_cube
     from lambent.core.pictures.images import write_image
     from lambent.scenes.scene import ImageEnvironment
 

@@ -61,7 +61,7 @@ def lit(environment: Floats, radius_rad: float = 0.0, material: Material = GLOSS
 
 @pytest.fixture(scope="module")
 def traced(mi: Any) -> Floats:
-    from lambent.bake.reference.path_traced import render_reference
+    from lambent.baking.reference.path_traced import render_reference
 
     objects = tuple(SceneObject(name, mesh, "m") for name, mesh in MESHES.items())
     light = DirectionalLight(tuple(-TOWARDS), IRRADIANCE)

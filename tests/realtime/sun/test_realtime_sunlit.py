@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
-from lambent.bake.quality import Quality
+from lambent.baking.bake import bake
+from lambent.baking.quality import Quality
 from lambent.core.pictures.images import write_image
 from lambent.core.views.camera import Camera
 from lambent.materials.document import Material
@@ -24,8 +24,8 @@ from lambent.scenes.geometry import box, placed, sphere
 from lambent.scenes.scene import ImageEnvironment, Mesh, Scene, SceneObject
 from lambent.store.store import Store
 from lambent.store.sunlit import GEOMETRY
-from tests.bake.sky.test_sun import disc
-from tests.bake.small_scenes import TINY, turned_inwards
+from tests.baking.sky.test_sun import disc
+from tests.baking.small_scenes import TINY, turned_inwards
 from tests.realtime.sun.test_realtime_sun import DOWN, TOWARDS, drawn, floor, places, plate, traced
 
 FINE = TINY.changed("fine", geometry={"texels": 320}, light_map={"samples": (4, 4)})

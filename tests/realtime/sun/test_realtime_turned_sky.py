@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
 from lambent.baked.light_fields import lookup as numpy_twin
 from lambent.baked.light_fields.shading import turned, under_sky
+from lambent.baking.bake import bake
 from lambent.core.errors import UserError
 from lambent.core.geometry.cubemap import face_directions, sample
 from lambent.realtime.frame_state import FrameState
@@ -23,7 +23,7 @@ from lambent.scenes.geometry import turn
 from lambent.scenes.scene import ComputedEnvironment, ConstantEnvironment, ImageEnvironment, Scene, SunSky
 from lambent.scenes.sky.turned_sky import under_turned_sky as scene_under_turned_sky
 from lambent.store.contract import FAR, SunRecord
-from tests.bake.small_scenes import TINY, plane
+from tests.baking.small_scenes import TINY, plane
 from tests.realtime.lit_plate import CAMERA, mirrored, plate_field, plate_scene
 from tests.realtime.lit_wall import smooth_light
 

@@ -183,7 +183,7 @@ def test_cornell_boxes_have_the_measured_corners() -> None:
 
 def test_cornell_floor_gets_the_light_of_a_rectangle(mi: Any) -> None:
     """Irradiance under the middle of a parallel rectangle (Howell, factor B-3), without interreflections."""
-    from lambent.bake.reference.path_traced import render_reference
+    from lambent.baking.reference.path_traced import render_reference
 
     scene = load_scene("builtin:cornell")
     bare = replace(
@@ -204,7 +204,7 @@ def test_cornell_floor_gets_the_light_of_a_rectangle(mi: Any) -> None:
 
 def test_the_loft_is_lit_through_its_windows_alone(mi: Any) -> None:
     """No light comes in where the windows are closed, whichever way it falls."""
-    from lambent.bake.reference.path_traced import render_reference
+    from lambent.baking.reference.path_traced import render_reference
 
     scene = replace(load_scene("builtin:loft"), environment=ConstantEnvironment((1.0, 1.0, 1.0)))
     x = -loft.X - loft.THICK / 2
@@ -257,8 +257,8 @@ def samples(mesh: Mesh) -> np.ndarray:
 
 
 def test_pixels_are_near_the_published_ones(published: Scene, mi: Any) -> None:
-    from lambent.bake.tracing.scene_builder import SceneBuilder
-    from lambent.bake.transport.view_points import view_points
+    from lambent.baking.tracing.scene_builder import SceneBuilder
+    from lambent.baking.transport.view_points import view_points
 
     builder, size = SceneBuilder(published), 128
     seen = view_points(builder, builder.build(), published.cameras[0], size, size)

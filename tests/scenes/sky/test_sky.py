@@ -111,7 +111,7 @@ def test_a_scene_names_an_interior(tmp_path: Path) -> None:
 
 
 def test_the_path_tracer_sees_the_interior(mi: Any) -> None:
-    from lambent.bake.sky.cube import environment_cube
+    from lambent.baking.sky.cube import environment_cube
     from lambent.core.geometry.cubemap import face_directions
     from lambent.core.geometry.directions import normalize
 

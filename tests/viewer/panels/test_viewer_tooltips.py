@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from imgui_bundle import imgui
 
-from lambent.bake.interreflection.proposal import Proposal, Row
+from lambent.baking.interreflection.proposal import Proposal, Row
 from lambent.core.views.camera import Camera
 from lambent.materials.document import KINDS
 from lambent.store.contract import ReflectorPart, ReflectorRecord

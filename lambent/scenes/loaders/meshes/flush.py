@@ -24,7 +24,7 @@ from lambent.core.plain import first_of
 from lambent.scenes.mesh import vertices_at_corners
 from lambent.scenes.scene import Scene, SceneObject
 
-RAISED = 5e-5  # metres, and share of the largest coordinate: five times the offset of rays (bake.tracing.rays); the
+RAISED = 5e-5  # metres, and share of the largest coordinate: five times the offset of rays (baking.tracing.rays); the
 # depth of a pixel is uncertain by 3e-6 of its distance
 RAISED_OF_SCENE = 2e-7  # likewise, of the scene's diagonal: twice the offset of rays
 IN_PLANE = 0.4  # of that, apart: surfaces that count as flush

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-from lambent.bake.interreflection.proposal import Proposal, time_said
-from lambent.bake.interreflection.settings import Bounces
+from lambent.baking.interreflection.proposal import Proposal, time_said
+from lambent.baking.interreflection.settings import Bounces
 from lambent.editing.interreflection.noise import PASS
 from lambent.editing.session.document import SessionDocument
 from lambent.editing.session.session import Session

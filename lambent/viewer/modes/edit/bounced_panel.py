@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from imgui_bundle import imgui
 
-from lambent.bake.interreflection.proposal import Proposal
+from lambent.baking.interreflection.proposal import Proposal
 from lambent.viewer.modes.edit.interreflections import SAMPLES, SERIES, SHOWN, Bounced
 from lambent.viewer.panels.widgets import AMBER, DIM, buttons, check, choice, press, wrapped
 

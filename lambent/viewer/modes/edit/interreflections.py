@@ -6,9 +6,9 @@ from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from pathlib import Path
 
-from lambent.bake.interreflection.proposal import Proposal
-from lambent.bake.interreflection.settings import Bounces
 from lambent.baked.transport.tails import FIXED
+from lambent.baking.interreflection.proposal import Proposal
+from lambent.baking.interreflection.settings import Bounces
 from lambent.core.errors import UserError
 from lambent.editing.interreflection.noise import light_of, noise, noted_noise
 from lambent.editing.interreflection.picture import BEYOND_DIRECT
@@ -39,7 +39,7 @@ class Bounced:
     on : bool
         Whether samples are baked up to `wanted`.
     series, wanted
-        Series of bands and samples of the bake; see `bake.interreflection.settings`.
+        Series of bands and samples of the bake; see `baking.interreflection.settings`.
     fixed : frozenset of str or None
         Materials whose edits do not change the light on others: from the store, the proposal, or the user; None
         before that.

@@ -18,7 +18,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from lambent.bake.interreflection.settings import Bounces
+from lambent.baking.interreflection.settings import Bounces
 from lambent.core.errors import UserError
 from lambent.editing.interreflection.noise import PASS, PassNoise
 from lambent.editing.session.session import Session
@@ -35,9 +35,9 @@ NICENESS = 10  # the window has priority
 
 def main(session: Path, folder: Path, lights: Sequence[int]) -> None:
     """Bake for each number of lights in turn."""
-    from lambent.bake.bake import bake
-    from lambent.bake.quality import quality_named
-    from lambent.bake.transport.view import View
+    from lambent.baking.bake import bake
+    from lambent.baking.quality import quality_named
+    from lambent.baking.transport.view import View
 
     opened = Session.open(session)
     document, scene = opened.document, scene_for(opened)
@@ -61,9 +61,9 @@ def main(session: Path, folder: Path, lights: Sequence[int]) -> None:
 
 def bounce(session: Path, folder: Path, bounces: Bounces, kept: Collection[str] | None) -> None:
     """Bake interreflections, or, given materials to keep, propose further materials to edit."""
-    from lambent.bake.bake import bake
-    from lambent.bake.interreflection.proposal import propose, same_materials
-    from lambent.bake.transport.view import View
+    from lambent.baking.bake import bake
+    from lambent.baking.interreflection.proposal import propose, same_materials
+    from lambent.baking.transport.view import View
 
     opened = Session.open(session)
     document, scene, light = opened.document, scene_for(opened), opened.environment
@@ -85,8 +85,8 @@ def bounce(session: Path, folder: Path, bounces: Bounces, kept: Collection[str] 
 
 def relight(folder: Path, room: object, view: object) -> None:
     """Bake a view of a store's room for relighting."""
-    from lambent.bake.running.relit import Relit
-    from lambent.bake.transport.view import View
+    from lambent.baking.running.relit import Relit
+    from lambent.baking.transport.view import View
 
     of = ViewRecord.model_validate(view)
     Relit(folder, RoomState.model_validate(room), View(of.camera, of.width, of.height)).bake(_progress)

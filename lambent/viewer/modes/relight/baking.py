@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from lambent.bake.interreflection.proposal import time_said
-from lambent.bake.running.relit import Relit
+from lambent.baking.interreflection.proposal import time_said
+from lambent.baking.running.relit import Relit
 from lambent.store.contract import VIEW
 from lambent.viewer.background.worker_process import WorkerProcess
 from lambent.viewer.modes.edit.baking import LEAST_DONE, RELIGHT, WORKER

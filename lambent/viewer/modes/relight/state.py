@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from lambent.bake.running.relit import Relit
+from lambent.baking.running.relit import Relit
 from lambent.core.arrays import Image
 from lambent.core.discovery import known
 from lambent.core.errors import UserError

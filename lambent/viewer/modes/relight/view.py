@@ -9,8 +9,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from lambent.bake.running.relit import relight_copy
-from lambent.bake.transport.view import View
+from lambent.baking.running.relit import relight_copy
+from lambent.baking.transport.view import View
 from lambent.core.errors import UserError, invalid
 from lambent.core.views.camera import Camera, overview
 from lambent.editing.relit_view import views_for_relighting

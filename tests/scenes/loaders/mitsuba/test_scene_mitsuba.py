@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.bake.engine import engine
-from lambent.bake.tracing.scene_builder import SceneBuilder, environment_dict
+from lambent.baking.engine import engine
+from lambent.baking.tracing.scene_builder import SceneBuilder, environment_dict
 from lambent.core.geometry.directions import normalize
 from lambent.core.pictures.images import write_image
 from lambent.core.views.camera import camera_axes

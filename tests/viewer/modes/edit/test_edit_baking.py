@@ -6,8 +6,8 @@ import time
 
 import pytest
 
-from lambent.bake.interreflection.proposal import Proposal, Row
-from lambent.bake.interreflection.settings import Bounces
+from lambent.baking.interreflection.proposal import Proposal, Row
+from lambent.baking.interreflection.settings import Bounces
 from lambent.editing.session.session import Session
 from lambent.viewer.modes.edit import baking
 from lambent.viewer.modes.edit.baking import Baking, Passes, Stage

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lambent.bake.interreflection.proposal import Proposal, Row
-from lambent.bake.interreflection.settings import Bounces
+from lambent.baking.interreflection.proposal import Proposal, Row
+from lambent.baking.interreflection.settings import Bounces
 from lambent.core.errors import UserError
 from lambent.core.views.camera import Camera
 from lambent.editing.session.session import Session

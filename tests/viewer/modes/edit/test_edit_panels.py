@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from lambent.bake.interreflection.proposal import Proposal, Row
+from lambent.baking.interreflection.proposal import Proposal, Row
 from lambent.viewer.mode import Drawing
 from lambent.viewer.modes.edit.mode import EditMode
 from lambent.viewer.modes.edit.state import DIRECT

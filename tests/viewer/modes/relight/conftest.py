@@ -5,8 +5,8 @@ import shutil
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
-from lambent.bake.transport.view import View
+from lambent.baking.bake import bake
+from lambent.baking.transport.view import View
 from lambent.core.pictures.images import write_image
 from lambent.scenes import load_scene
 from lambent.store.kept.session import FILE, RoomState, WalkSession, write_session

@@ -159,7 +159,7 @@ def test_a_failed_bake_is_a_line(opened, gold_tray, bakes):
 
 def test_the_folder_of_something_else_is_left_alone(opened, gold_tray):
     Store.create(gold_tray.parent / COPY, {}).close()
-    from lambent.bake.running.relit import Relit
+    from lambent.baking.running.relit import Relit
 
     state = opened(gold_tray)
     with pytest.raises(UserError, match=f"{COPY}: is another store"):

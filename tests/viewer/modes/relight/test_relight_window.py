@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from lambent.bake.running.relit import Relit
-from lambent.bake.transport.view import View
+from lambent.baking.running.relit import Relit
+from lambent.baking.transport.view import View
 from lambent.cli.main import run
 from lambent.core.pictures.images import read_image
 from lambent.editing.relit_view import RelitView

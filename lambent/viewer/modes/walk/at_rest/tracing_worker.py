@@ -118,7 +118,7 @@ class Rooms:
 
     def _baked_again(self, state: object, lamps: Lamps) -> TracedRoom:
         """The room of the copy beside the store, baked in a state with these lamps."""
-        from lambent.bake.running.again import rebaked_copy
+        from lambent.baking.running.again import rebaked_copy
         from lambent.traced.room import room_of_store
 
         if self._rebaked is None or self._rebaked[0] != state:

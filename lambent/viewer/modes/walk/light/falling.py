@@ -9,10 +9,10 @@ from typing import cast
 
 import numpy as np
 
-from lambent.bake.surfaces.coverage import Pieces, pieces_of
 from lambent.baked.answering.answer import Neighbours, side_by_side, upsampled
 from lambent.baked.answering.delta_bytes import from_delta_bytes
 from lambent.baked.answering.stored import answer_name, has_answer
+from lambent.baking.surfaces.coverage import Pieces, pieces_of
 from lambent.core.arrays import Floats, Indices
 from lambent.core.light.light_mix import LightMix
 from lambent.core.light.photometry import ILLUMINANCE, photometric

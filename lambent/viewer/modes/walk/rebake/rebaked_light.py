@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.surfaces.coverage import pieces_of
+from lambent.baking.surfaces.coverage import pieces_of
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.light.light_mix import Factors
 from lambent.core.views.camera import Camera, image_plane

@@ -1,6 +1,6 @@
 """Rebakes the light of edited materials in the background, and blends it into the picture as it arrives.
 
-A process of low priority bakes into a copy beside the store (`bake.running.again`). Another edit stops it; the next
+A process of low priority bakes into a copy beside the store (`baking.running.again`). Another edit stops it; the next
 bake reuses finished parts of the copy. The estimated light is replaced object by object (`rebaked_light`), without a
 jump.
 """
@@ -13,7 +13,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from lambent.bake.running.again import KINDS, rebaked_copy
+from lambent.baking.running.again import KINDS, rebaked_copy
 from lambent.core.errors import UserError
 from lambent.core.light.light_mix import Factors, LightMix
 from lambent.core.views.camera import Camera

@@ -5,7 +5,7 @@ python -m lambent.viewer.modes.walk.rebake.rebaking_worker STORE COPY
 The first line of stdin is a `RoomState` as a JSON object, in light as baked. The end of
 stdin ends the process at any moment; the next bake continues the copy. Every line of stdout is a JSON object: "what",
 "done" and "total" of a step; "error", a line for the user; "kind" and "there", names of arrays that are now in the
-copy; "region", the shape (n, H, W) of light that is finished before its light map (`bake.running.watch`), followed by
+copy; "region", the shape (n, H, W) of light that is finished before its light map (`baking.running.watch`), followed by
 its bytes, n H W 3 half floats and H W flags; or "baked", when everything is complete.
 """
 
@@ -22,8 +22,8 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.bake.running.again import KINDS, bake_again
-from lambent.bake.running.watch import Watch
+from lambent.baking.running.again import KINDS, bake_again
+from lambent.baking.running.watch import Watch
 from lambent.core.arrays import Flags
 from lambent.core.errors import UserError
 from lambent.store.kept.images import with_paths

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
+from lambent.baking.bake import bake
 from lambent.core.pictures.images import write_image
 from lambent.core.views.camera import Camera
 from lambent.scenes import load_scene
 from lambent.viewer.modes.walk.mode import open_store
-from tests.bake.small_scenes import TINY
+from tests.baking.small_scenes import TINY
 from tests.viewer.drawn_frames import drawn, until
 
 SIZE = (48, 32)

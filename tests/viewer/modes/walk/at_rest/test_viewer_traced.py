@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
-from lambent.bake.running.again import bake_again, rebaked_copy
+from lambent.baking.bake import bake
+from lambent.baking.running.again import bake_again, rebaked_copy
 from lambent.core.light.light_mix import GroupMix, LightMix
 from lambent.core.pictures.images import read_image
 from lambent.core.views.camera import CameraPath
@@ -22,7 +22,7 @@ from lambent.viewer.modes.walk.at_rest.tracing_worker import Rooms
 from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.state import WalkState
 from lambent.viewer.screen import Rect
-from tests.bake.small_scenes import TINY
+from tests.baking.small_scenes import TINY
 from tests.viewer.drawn_frames import LONGEST_S, drawn, until
 
 SIZE = (48, 32)
@@ -91,7 +91,7 @@ def b_of(pictures, state, samples):
 
 
 def reference(store, camera, samples):
-    from lambent.bake.reference.path_traced import render_reference
+    from lambent.baking.reference.path_traced import render_reference
     from lambent.store.source import scene_of
 
     return render_reference(scene_of(Store.open(store)), camera, *SIZE, samples, seed=5)

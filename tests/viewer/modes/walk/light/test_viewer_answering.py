@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
 from lambent.baked.answering.stored import read_answer
+from lambent.baking.bake import bake
 from lambent.core.views.camera import Camera
 from lambent.realtime.answering.answer_shown import answered
 from lambent.realtime.frame_state import FrameState
@@ -23,7 +23,7 @@ from lambent.scenes.scene import SceneObject
 from lambent.store.store import Store
 from lambent.viewer.modes.walk.light import answering
 from lambent.viewer.modes.walk.light.answering import WITHOUT, Answering, AnsweringLight
-from tests.bake.small_scenes import GREY, TINY, room_with_step
+from tests.baking.small_scenes import GREY, TINY, room_with_step
 from tests.realtime.answering.answered_scene import answered_scene
 from tests.viewer.small_store import write_small_store
 from tests.viewer.waiting import until

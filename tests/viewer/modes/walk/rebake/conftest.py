@@ -2,9 +2,9 @@
 
 import pytest
 
-from lambent.bake.bake import bake
+from lambent.baking.bake import bake
 from lambent.scenes import load_scene
-from tests.bake.small_scenes import TINY
+from tests.baking.small_scenes import TINY
 from tests.viewer.modes.walk.rebake.recorded_bakes import Box, painted
 
 

@@ -3,10 +3,10 @@
 import io
 import json
 
-from lambent.bake.running.again import bake_again
+from lambent.baking.running.again import bake_again
 from lambent.store.kept.session import RoomState
 from lambent.viewer.modes.walk.rebake.rebaking_worker import StreamWatch
-from tests.bake.small_scenes import TINY
+from tests.baking.small_scenes import TINY
 
 TILES = TINY.changed("tiles", light_map={"tile_texels": 16})
 REPLAYS = """

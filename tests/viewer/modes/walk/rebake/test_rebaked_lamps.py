@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
-from lambent.bake.running.again import bake_again, rebaked_copy
+from lambent.baking.bake import bake
+from lambent.baking.running.again import bake_again, rebaked_copy
 from lambent.core.views.camera import Camera
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.gpu.device import open_device
@@ -20,7 +20,7 @@ from lambent.viewer.modes.walk.at_rest.tracing import Wish
 from lambent.viewer.modes.walk.at_rest.tracing_worker import Rooms
 from lambent.viewer.modes.walk.rebake.arrivals import Arrived, Region
 from lambent.viewer.modes.walk.rebake.rebaked_light import Rebaked
-from tests.bake.small_scenes import TINY
+from tests.baking.small_scenes import TINY
 from tests.realtime.lamps.test_changed_lamps import IES
 from tests.traced.test_traced_pictures import traced
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bake.bake import bake
-from lambent.bake.running.again import COPY_OF, bake_again, rebaked_copy
+from lambent.baking.bake import bake
+from lambent.baking.running.again import COPY_OF, bake_again, rebaked_copy
 from lambent.core.errors import UserError
 from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe
@@ -23,7 +23,7 @@ from lambent.viewer.modes.walk.rebake.rebaked_light import (
     steps,
     texel_steps,
 )
-from tests.bake.small_scenes import TINY
+from tests.baking.small_scenes import TINY
 from tests.viewer.modes.walk.rebake.recorded_bakes import TILES, painted
 
 SIZE = (64, 48)

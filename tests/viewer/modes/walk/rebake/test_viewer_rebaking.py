@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.bake.running.again import rebaked_copy
+from lambent.baking.running.again import rebaked_copy
 from lambent.core.light.light_mix import GroupMix, LightMix
 from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
@@ -38,11 +38,11 @@ say(what="light map", done=1, total=4)
 """
 ENDLESS = """
 import runpy, sys, time
-import lambent.bake.running.again
+import lambent.baking.running.again
 def endless(*_, **__):
     print("begun", flush=True)
     time.sleep(60)
-lambent.bake.running.again.bake_again = endless
+lambent.baking.running.again.bake_again = endless
 runpy.run_module("lambent.viewer.modes.walk.rebake.rebaking_worker", run_name="__main__", alter_sys=False)
 """
 

@@ -1,1 +1,0 @@
-"""Kinds of artefacts, one file each; `lambent.bake.context` describes what a file must contain."""

@@ -1,0 +1,222 @@
+"""Irradiance at every texel of the light map, path traced with the actual materials.
+
+A tile is sampled in pairs of passes, traced together but summed separately: half their difference estimates the noise.
+The raw sums stay in the store, and a bake resumes from them after any interruption.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from lambent.baking.light.denoise import denoise_charts, fill
+from lambent.baking.light.detail import with_detail
+from lambent.baking.light.level import with_level
+from lambent.baking.light.stitching import Cuts, stitched
+from lambent.baking.surfaces.texels import POINTS, Sides, Texels, area_of_texels, covered_share
+from lambent.baking.tracing import path_tracer
+from lambent.baking.tracing.lights.sun import Unseen
+from lambent.baking.tracing.rays import block_sums, independent, vectors
+from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.geometry.sequences import hammersley, r2
+from lambent.core.light.colour import HALF_MAX, luminance
+
+GATHER_PASS = 64  # samples of a texel that are stratified together
+SMOOTH = 8  # rounds of averaging before texels grow into gutters: about 4 texels wide
+
+
+Estimate = Callable[..., Any]  # one sample of three numbers per point, like `path_tracer.irradiance`
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How to sample texels: `samples` (least, most) times, until the relative noise is reached.
+
+    With a `cache` (`path_tracer.radiance`), paths end at diffuse surfaces, and the scene must have no diffuse terms.
+    Direct light of the sun `unseen` is left out. A `tally` sums parts of the light, the last `parts` of which are
+    stored in addition to the whole; the cache must then suit the tally. Noise is relative to the light with that of
+    `lamps` (H, W, 3), which samples do not have.
+    """
+
+    samples: tuple[int, int]
+    noise: float
+    max_depth: int
+    per_pass: int
+    cache: Any = None
+    estimate: Estimate = path_tracer.irradiance
+    unseen: Unseen | None = None
+    tally: path_tracer.Tally | None = None
+    parts: int = 0
+    lamps: Floats | None = None
+
+
+def path_traced(samples: tuple[int, int], noise: float, max_depth: int) -> Sampling:
+    """Sampling of all bounces, in the whole scene; `max_depth` as in `path_tracer.radiance`."""
+    return Sampling(samples, noise, max_depth, min(32, max(1, samples[0] // 2)))
+
+
+def gathered(samples: int, noise: float, max_depth: int, cache: Any) -> Sampling:
+    """One diffuse bounce onto cached light, through any mirrors in between (final gathering, Reichert 1992)."""
+    per_pass = max(1, min(GATHER_PASS, samples // 2))
+    return Sampling((2 * per_pass, samples), noise, max_depth, per_pass, cache)
+
+
+def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int, how: Sampling) -> Floats:
+    """Raw content of one tile: (2, h, w, 4 + 3 parts) float32, the sums of both halves, of the whole and of each part.
+
+    The fourth channel has the sample counts.
+    """
+    rows, columns = region[1], region[2]
+    height, width = rows.stop - rows.start, columns.stop - columns.start
+    row, column = np.divmod(sides.texels.index, sides.texels.width)
+    inside = (row >= rows.start) & (row < rows.stop) & (column >= columns.start) & (column < columns.stop)
+    mine = np.flatnonzero(inside & sides.valid.any(axis=1))
+    channels = 4 + 3 * how.parts
+    raw = np.zeros((2, height * width, channels), np.float32)
+    if not len(mine):
+        return raw.reshape(2, height, width, channels)
+    points = points_of(sides, mine)
+    sums = np.zeros((2, len(mine), 3 + 3 * how.parts))
+    fewest, most = how.samples
+    of_lamps = 0.0 if how.lamps is None else how.lamps.reshape(-1, 3)[sides.texels.index[mine]].astype(float)
+    passes = 0
+    while passes * how.per_pass < most:
+        sums += _sums_of_pass(scene, points, len(mine), (seed, passes), how)
+        passes += 2
+        samples = passes * how.per_pass
+        if samples >= fewest and relative_noise(sums[..., :3] * 2 / samples + of_lamps) <= how.noise:
+            break
+    place = (row[mine] - rows.start) * width + column[mine] - columns.start
+    raw[:, place, :3], raw[:, place, 4:] = sums[..., :3], sums[..., 3:]
+    raw[:, place, 3] = passes * how.per_pass / 2
+    return raw.reshape(2, height, width, channels)
+
+
+def relative_noise(halves: Floats, share: Floats | None = None) -> float:
+    """Root mean square error of the mean of two estimates (2, ..., 3), relative to its mean; 0 if black or empty.
+
+    Estimates are weighted equally, or by `share` (...), for example by area.
+    """
+    if not halves.size:
+        return 0.0
+    squares, light = (luminance(halves[0] - halves[1]) / 2) ** 2, luminance(halves)
+    if share is not None and share.any():
+        mean_square, mean = np.average(squares, weights=share), np.average(light.mean(axis=0), weights=share)
+        return float(np.sqrt(mean_square) / mean) if mean > 0 else 0.0
+    mean = light.mean()
+    return float(np.sqrt(np.mean(squares)) / mean) if mean > 0 else 0.0
+
+
+def points_of(sides: Sides, mine: Indices) -> path_tracer.Points:
+    """POINTS of some texels on the device; invalid points are replaced by valid ones of the same texel."""
+    valid = sides.valid[mine]
+    ranked = np.argsort(~valid, axis=1, kind="stable")  # valid points first, used in turn
+    turn = np.arange(POINTS) % valid.sum(axis=1)[:, None]
+    choice = np.where(valid, np.arange(POINTS), np.take_along_axis(ranked, turn, axis=1))[..., None]
+    t = sides.texels
+    chosen = (np.take_along_axis(values[mine], choice, axis=1) for values in (t.positions, t.normals, t.flat))
+    position, normal, flat = (
+        vectors(mi.Vector3f, v * s) for v, s in zip(chosen, (1, sides.sign, sides.sign), strict=True)
+    )
+    return path_tracer.Points(position, normal, flat)
+
+
+def _sums_of_pass(scene: Any, points: path_tracer.Points, count: int, seed: tuple[int, int], how: Sampling) -> Floats:
+    """Sums (2, n, 3 + 3 parts) of a pair of passes' irradiance samples per texel, of the whole and of each part.
+
+    In both passes every texel uses the same two stratified point sets, shifted by its own random offsets (Cranley &
+    Patterson 1976).
+    """
+    n, samples = 2 * count, how.per_pass
+    rng = np.random.default_rng(seed)
+    shifts = rng.random((4, n), dtype=np.float32)
+    thread = dr.arange(mi.UInt32, n * samples)
+    texel, k = thread // samples, thread % samples  # texels of the first pass, then of the second
+    first = dr.gather(mi.UInt32, mi.UInt32(rng.integers(POINTS, size=n, dtype=np.uint32)), texel)
+    # the low bit already determines the azimuth of Hammersley points; a constant count would recompile for every tile
+    point = texel % dr.opaque(mi.UInt32, count) * POINTS + (k // 2 + first) % POINTS
+    at = path_tracer.Points(*(dr.gather(mi.Vector3f, v, point) for v in (points.position, points.normal, points.flat)))
+    u_bsdf = _shifted(hammersley(samples), shifts[:2], k, texel)
+    u_emitter = _shifted(r2(samples), shifts[2:], k, texel)
+    sampler = independent(int(rng.integers(1 << 32)), n * samples)
+    found = _estimates(scene, sampler, at, u_bsdf, u_emitter, how)
+    usable = dr.all(dr.isfinite(found[0]))
+    found = [dr.select(usable, e, 0.0) for e in found]
+    dr.eval(found)
+    return np.concatenate([block_sums(e, samples).reshape(2, count, 3) for e in found], axis=-1)
+
+
+def _estimates(
+    scene: Any, sampler: Any, at: path_tracer.Points, u_bsdf: Any, u_emitter: Any, how: Sampling
+) -> list[Any]:
+    """A sample (mi.Color3f) of each point: the whole, then the stored parts."""
+    if how.tally is None:
+        return [how.estimate(scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache, how.unseen)]
+    sums = path_tracer.irradiance_sums(
+        scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache, how.tally, how.unseen
+    )
+    return [mi.Color3f(sum(sums[: how.tally.count])), *sums[len(sums) - how.parts :]]
+
+
+def _shifted(points: Floats, shifts: Floats, k: Any, texel: Any) -> Any:
+    both = zip(points.T.astype(np.float32), shifts, strict=True)
+    u = [dr.gather(mi.Float, mi.Float(p), k) + dr.gather(mi.Float, mi.Float(shift), texel) for p, shift in both]
+    return mi.Point2f(u[0] - dr.floor(u[0]), u[1] - dr.floor(u[1]))
+
+
+def finished(raw: Floats, texels: Texels, labels: Indices, cuts: Cuts) -> tuple[Floats, dict[str, float]]:
+    """The light map (H, W, 3) float16 from its raw sums (2, H, W, 4), and its noise and samples as meta."""
+    halves, known = sampled_halves(raw)
+    samples = float(raw[..., 3].sum(axis=0)[known].mean()) if known.any() else 0.0
+    meta = {"noise": relative_noise(halves[:, known]), "samples": samples}
+    return cleaned(halves.mean(axis=0), known, texels, labels, cuts, variance_of(halves)), meta
+
+
+def plus(light: Floats, direct: Floats) -> NDArray[np.float16]:
+    """Sum of a light map and direct light that its samples do not have."""
+    return np.minimum(np.add(light, direct, dtype=np.float32), HALF_MAX).astype(np.float16)
+
+
+def variance_of(halves: Floats) -> Floats:
+    """Squared standard error (H, W) of the luminance of the mean of two halves (2, H, W, 3), from one difference."""
+    return np.asarray(luminance(np.asarray(halves[0] - halves[1], np.float32) / 2) ** 2)
+
+
+def sampled_halves(raw: Floats) -> tuple[Floats, Flags]:
+    """Irradiance (2, H, W, 3) of both halves of path traced sums (2, H, W, 4), and flags of sampled texels (H, W)."""
+    count = raw[..., 3:]
+    return raw[..., :3] / np.maximum(count, 1), count[0, ..., 0] > 0
+
+
+def cleaned(
+    irradiance: Floats, known: Flags, texels: Texels, labels: Indices, cuts: Cuts, variance: Floats | None = None
+) -> NDArray[np.float16]:
+    """Denoise a light map (H, W, 3), fill unknown texels and close its seams; `variance` as in `denoised`."""
+    if not known.any():
+        return np.zeros(irradiance.shape, np.float16)
+    clean = denoised(irradiance, known, labels, variance)
+    return np.asarray(closed(clean[None], known, texels, labels, cuts)[0], np.float16)
+
+
+def denoised(irradiance: Floats, known: Flags, labels: Indices, variance: Floats | None = None) -> Floats:
+    """Denoise a light map (H, W, 3) at the level of its samples.
+
+    With the `variance` (H, W) of its luminance, detail that the filter loses is kept.
+    """
+    clean = with_level(denoise_charts(irradiance, known, labels, smooth=SMOOTH), irradiance, known, labels)
+    return clean if variance is None else with_detail(clean, irradiance, variance, known, labels)
+
+
+def closed(clean: Floats, known: Flags, texels: Texels, labels: Indices, cuts: Cuts) -> NDArray[np.float16]:
+    """Fill unknown texels of denoised light maps (n, H, W, 3), and close their seams."""
+    together = np.concatenate(list(clean), axis=-1)
+    together = fill(together, known, labels)
+    each = np.split(together, len(clean), axis=-1)
+    areas = area_of_texels(texels), covered_share(texels)
+    return np.array([np.minimum(stitched(one, cuts, labels, *areas), HALF_MAX) for one in each], np.float16)

@@ -1,0 +1,161 @@
+"""Tiles on other processes: the same arrays, whoever dies."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lambent.baking.bake import bake
+from lambent.baking.interreflection.settings import Bounces
+from lambent.baking.running.cluster import DaskWorkers, opened
+from lambent.baking.running.workers import Workers
+from lambent.baking.transport.view import View
+from lambent.core.errors import UserError
+from lambent.core.progress import Progress, silent
+from lambent.materials.document import Lobe, Material
+from lambent.store.store import Store
+from tests.baking.interreflection.test_interreflection import FIRST, FROM_ABOVE, corner
+
+BOUNCES = Bounces((16, 1, 1), samples=64, fixed=frozenset({"side"}))
+VIEW = View(FROM_ABOVE, 16, 16)
+GLOSSY = Material(kd=0.3, lobes=(Lobe(mx=0.3, my=0.3, r0=0.5),))
+SCENE = corner({**FIRST, "floor": GLOSSY})
+TILES = 5  # of a pass: two terms of the floor are one job
+
+
+def baked(folder: Path, workers: Workers | None = None, progress: Progress = silent) -> Store:
+    return bake(
+        SCENE, folder, only={"interreflection"}, views=[VIEW], bounces=BOUNCES, workers=workers, progress=progress
+    )
+
+
+def assert_same(ours: Store, theirs: Store) -> None:
+    names = {a.name for a in theirs.artefacts()}
+    assert {a.name for a in ours.artefacts()} == names
+    for name in names:
+        assert ours.artefact(name).meta == theirs.artefact(name).meta
+        assert np.array_equal(ours.read(name), theirs.read(name)), name
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> Store:
+    return baked(tmp_path_factory.mktemp("alone") / "s")
+
+
+@pytest.fixture(scope="module")
+def two() -> Iterator[DaskWorkers]:
+    pytest.importorskip("distributed", reason="Dask is not installed")
+    with opened(count=2) as workers:
+        yield workers
+
+
+def kill_one(workers: DaskWorkers) -> None:
+    os.kill(min(workers.client.run(os.getpid).values()), signal.SIGKILL)
+
+
+class Elsewhere:
+    """All that is done went through bytes, as to another process, and in another order."""
+
+    def each(self, work: Any, jobs: Any) -> Any:
+        there = pickle.loads(pickle.dumps(work))
+        return [(job, there(pickle.loads(pickle.dumps(job)))) for job in reversed(list(jobs))]
+
+
+def test_tiles_depend_on_their_jobs_alone(alone: Store, tmp_path: Path) -> None:
+    assert_same(baked(tmp_path / "s", Elsewhere()), alone)
+
+
+def test_what_is_interrupted_keeps_its_tiles(alone: Store, tmp_path: Path) -> None:
+    def stop(done: float, total: float, what: str) -> None:
+        if "32 samples" in what and done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        baked(tmp_path / "s", progress=stop)
+    kept = [a.meta["samples"] for a in Store.open(tmp_path / "s").artefacts("interreflection") if "samples" in a.meta]
+    assert sorted(set(kept)) == [16, 32]
+    assert_same(baked(tmp_path / "s"), alone)
+
+
+def test_terms_of_different_samples_begin_anew(alone: Store, tmp_path: Path) -> None:
+    """A bake that died between the terms of a tile does not count samples twice."""
+    store = baked(tmp_path / "s")
+    name = next(a.name for a in store.artefacts("interreflection") if "/floor/1/0" in a.name)
+    whole = store.artefact(name)
+    with Store.create(tmp_path / "s", store.inputs) as again:
+        writer = again.begin(name, "interreflection", whole.shape, whole.shape, "uint32", key=whole.key)
+        writer.write((0,), store.read(name) * 0)
+        writer.finish(**{**whole.meta, "samples": 32})
+        again.forget([VIEW.name("interreflection", "samples")])
+    after = baked(tmp_path / "s")
+    counts, before = after.read(name)[: whole.meta["points"]], alone.read(name)[: whole.meta["points"]]
+    assert np.array_equal(counts, before)  # the same paths, added up in one go
+
+
+def test_a_worker_that_is_killed_is_survived(alone: Store, two: DaskWorkers, tmp_path: Path) -> None:
+    calls = iter(range(1000))
+
+    def progress(done: float, total: float, what: str) -> None:
+        if next(calls) in (3, 9):
+            kill_one(two)
+
+    assert_same(baked(tmp_path / "s", two, progress), alone)
+
+
+def test_a_bake_that_is_interrupted_leaves_workers_that_go_on(alone: Store, two: DaskWorkers, tmp_path: Path) -> None:
+    def stop(done: float, total: float, what: str) -> None:
+        if "32 samples" in what and done == 1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        baked(tmp_path / "s", two, stop)
+    assert_same(baked(tmp_path / "s", two), alone)
+
+
+def test_a_cluster_that_runs_already(two: DaskWorkers) -> None:
+    with opened(address=two.client.scheduler.address) as workers:
+        assert dict(workers.each(abs, [-1, 2, -3])) == {-1: 1, 2: 2, -3: 3}
+    assert dict(two.each(abs, [-4])) == {-4: 4}
+
+
+def test_a_job_that_kills_its_workers_is_given_up() -> None:
+    dask = pytest.importorskip("dask", reason="Dask is not installed")
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}), opened(count=1) as workers,
+        pytest.raises(UserError, match="several workers died"),
+    ):  # fmt: skip
+        list(workers.each(os._exit, [3]))
+
+
+def test_a_worker_with_other_libraries_is_refused(two: DaskWorkers, monkeypatch: pytest.MonkeyPatch) -> None:
+    from lambent.baking.running import cluster
+
+    ours = cluster.made_with()
+    monkeypatch.setattr(cluster, "made_with", lambda: {**ours, "mitsuba": "2.0"})
+    with pytest.raises(UserError, match=r"different mitsuba.*3"):
+        list(two.each(abs, [1]))
+
+
+def test_workers_that_there_are_none_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed", reason="Dask is not installed")
+    for mistake in ({}, {"count": 1, "address": "tcp://127.0.0.1:1"}, {"count": 0}):
+        with pytest.raises(UserError, match="workers"), opened(**mistake):  # type: ignore[arg-type]
+            pass
+    monkeypatch.setattr("lambent.baking.running.cluster.SECONDS", 1.0)
+    for nowhere in ("tcp://127.0.0.1:1", "nonsense", "smoke://a:1"):
+        with pytest.raises(UserError, match="no worker answered"), opened(address=nowhere):
+            pass
+
+
+def test_without_dask(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(UserError, match=r"pip install 'lambent\[cluster\]'"), opened(count=2):
+        pass
