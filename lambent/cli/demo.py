@@ -10,6 +10,11 @@ import typer
 from lambent.cli.console import Json, progress_bar, say, show, table
 from lambent.core.machine import has_display
 
+NEXT = """next:
+  lambent walk {out}/store
+  lambent edit {out}/measured/brushed_aluminium.txt {out}/materials/brushed_aluminium.json
+  lambent fit YOUR_MEASUREMENT --lobes auto -o yours.json --report yours.html"""
+
 
 def command(
     out: Annotated[Path, typer.Option(help="Output folder.")] = Path("out/demo"),
@@ -35,7 +40,7 @@ def command(
             flow.compare(scene)
     report = flow.finish()
     rows = ((name, f"{seconds:.1f} s") for name, seconds in report["seconds"].items())
-    show(report, f"{table(rows)}\n\n{out / 'demo.json'}", json)
+    show(report, f"{table(rows)}\n\n{out / 'demo.json'}\n\n{NEXT.format(out=out)}", json)
     if not windowless:
         from lambent.viewer.app import run
 
