@@ -52,7 +52,9 @@ def read(
 
         return Scene.read(file, crease_deg)
     if kind == "store":
-        return open(file)
+        from lambent.api.stores import Store
+
+        return Store(file)
     if kind == "picture":
         from lambent.api.pictures import Picture
 

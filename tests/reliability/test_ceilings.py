@@ -134,6 +134,8 @@ def _raw_opens() -> Iterator[str]:
 
 OWN_FILES = {
     "baking/engine.py: file.read_text": "the cache of what Mitsuba can do here",
+    "api/pictures.py: file.read_bytes": "the plot that was just written",
+    "core/light/observer.py: (files('lambent.core.light') / 'cie_1931.csv').read_text": "the package's table",
     "core/pictures/exr.py: open": "the null device",
     "core/files.py: beside.open": "a file that is being written",
     "core/files.py: os.open": "a file that is about to be written",

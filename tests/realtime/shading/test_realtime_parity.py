@@ -14,7 +14,7 @@ from lambent.core.light.false_colour import STOPS, Range, false_colour
 from lambent.core.light.photometry import LM_PER_W
 from lambent.materials.shader_layout import lobe_shader
 from lambent.realtime.gpu.shader_source import assemble
-from lambent.realtime.integrators import albedo
+from lambent.realtime.integrators import albedo, patterns
 from lambent.realtime.planar import planar_pass as planar
 from lambent.store import contract
 from tests.tools.shader_parity import assert_parity, run_wgsl
@@ -83,7 +83,7 @@ def test_perpendiculars_and_octahedral_coordinates() -> None:
     [
         ("albedo_factor", f"const FACTOR_ROWS = {albedo.FACTORS // 4}u;"),
         ("split_sum", f"const LAST_LEVEL = {albedo.LEVELS - 1}.0;"),
-        ("lobes", f"const LAMBENT_COS_MIN: f32 = {albedo.COS_MIN:.0e};".replace("e-0", "e-")),
+        ("lobes", f"const LAMBENT_COS_MIN: f32 = {patterns.COS_MIN:.0e};".replace("e-0", "e-")),
         ("planar_buffer_sky", f"const FAR = {contract.FAR:.0e};".replace("e+0", "e")),
         ("planar_layers", f"const PLANAR_NARROW = {planar.FOUND};"),
         ("planar_layers", f"const PLANAR_LEAST = {planar.FOUND + planar.CLEANED - 1};"),
