@@ -8,6 +8,7 @@ import shlex
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lambent.baking import bake as baking
@@ -148,3 +149,7 @@ def test_the_five_minutes(lambent, tmp_path, monkeypatch):
     for line in COMMANDS:
         for output in re.findall(r"(?:-o|--report|--plot) (\S+)", line):
             assert Path(output).exists(), line
+    python = MINUTES.split("From Python")[1].replace("(640, 360)", "(64, 36)")
+    up = np.array([0.0, 0.0, 1.0])
+    exec("\n".join(re.findall(r"^ {4}(.*)$", python, re.MULTILINE)), {"wi": up, "wo": up})
+    assert Path("table.png").exists()
