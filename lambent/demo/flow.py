@@ -28,8 +28,8 @@ from lambent.baking.quality import Quality, quality_named
 from lambent.baking.reference.goniophotometer import measure
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
-from lambent.core.light.colour import srgb_decode
-from lambent.core.pictures.images import write_image, write_shown
+from lambent.core.light.colour import shown, srgb_decode
+from lambent.core.pictures.images import to_bytes, write_image, write_shown
 from lambent.core.pictures.metrics import compare
 from lambent.core.plain import plain
 from lambent.core.progress import Progress, part_of
@@ -76,8 +76,10 @@ class Effort:
     path_spp: int
     rest_spp: int
     moving_frames: int = 16
+    first_spp: int = 16
 
 
+FIRST = 640, 400  # pixels of the first picture
 DRAFT = quality_named("preview").changed(
     "draft",
     geometry={"texels": 192},
@@ -121,6 +123,7 @@ class Flow:
         tables = self.measure()
         try:
             scene = self.place(self.fit(tables))
+            self.look(scene)
             self.bake(scene)
             with self._timed("plot"):  # the remaining plots, after the bake
                 for plotted in self._plotted:
@@ -165,6 +168,24 @@ class Flow:
         self.report["scene"] = {"name": scene.name, "objects": len(scene.objects), "triangles": triangles}
         return scene
 
+    def look(self, scene: Scene) -> None:
+        """A first picture, of whole paths, before anything is baked: first.png."""
+        from lambent.baking.engine import engine
+
+        engine()
+        from lambent.baking.pictures.stored import scene_alone  # imports Mitsuba, whose variant is set now
+        from lambent.baking.pictures.tracer import Tracer
+        from lambent.traced.picture import TracedPicture
+
+        file, spp = self.out / "first.png", self.effort.first_spp
+        with self._timed("first picture"):
+            self.progress(0, spp, f"first picture, {file}")
+            traced = TracedPicture(Tracer.of_paths(scene_alone(scene)), scene.cameras[0], FIRST, path=True)
+            while traced.samples < spp:
+                traced.sample(spp - traced.samples)
+                self.progress(traced.samples, spp, f"first picture, {file}")
+            write_shown(file, to_bytes(shown(traced.denoised(), "filmic", scene.exposure_ev or 0.0)))
+
     def bake(self, scene: Scene) -> None:
         """Bake the store, or resume an interrupted bake."""
         with self._timed("bake"):
@@ -191,8 +212,8 @@ class Flow:
             return renderer.display_image(replace(frame, camera=camera))
 
         with self._timed("film"):
-            shown = walked(path, effort.film_fps)
-            write_frames(self.out / "walk.mp4", shown, draw, effort.film, effort.film_fps, self.progress)
+            path_cameras = walked(path, effort.film_fps)
+            write_frames(self.out / "walk.mp4", path_cameras, draw, effort.film, effort.film_fps, self.progress)
 
     def compare(self, scene: Scene) -> None:
         """Compare one view in motion, at rest, and path traced."""

@@ -86,6 +86,8 @@ def test_the_flow_ends_with_everything_it_names(tmp_path: Path) -> None:
         picture = read_encoded(tmp_path / f"walk_{k + 1}.png")
         assert picture.shape == (100, 160, 3)
         assert 0.1 < picture.mean() < 0.95 and picture.std() > 0.05
+    first = read_encoded(tmp_path / "first.png")
+    assert first.shape == (400, 640, 3) and first.std() > 0.05
     frames, _ = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "walk.mp4"))
     assert frames == 7
     # A coarse bake and few paths: what would fail here is a mirrored, shifted, black or wrongly lit picture.
