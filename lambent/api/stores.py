@@ -12,7 +12,7 @@ from lambent.api.materials import Material
 from lambent.api.pictures import Picture
 from lambent.api.progress import Wanted, progress_of
 from lambent.core.discovery import known
-from lambent.core.errors import UserError
+from lambent.core.errors import UserError, invalid
 from lambent.core.extras import needing_extras
 from lambent.core.light.light_mix import MixTrack, parse_light
 from lambent.core.views.camera import Camera
@@ -106,7 +106,7 @@ class Store:
         edits : mapping, optional
             Materials in place of the baked ones, by name; the light of other surfaces follows.
         variant : str
-            A variant or stored state: its materials and its light.
+            A variant or stored state: its materials and its light; "saved" is the room as the window left it.
         exposure_ev : float, optional
             Stops; by default the scene's, else metered.
         view : {"filmic", "neutral", "linear"}
@@ -196,14 +196,21 @@ class Store:
         Raises
         ------
         UserError
-            If the store cannot be traced, or has no such grid, object or light.
+            If the store cannot be traced, or has no such grid, object or light, or a number is out of range.
         """
+        from pydantic import ValidationError
+
         from lambent.render.illuminance import illuminated
         from lambent.scenes.loaders.scene_toml.grids import GridSection
 
         wanted: GridSection | list[str] = [grid] if isinstance(grid, str) else list(grid or ())
+        if over is not None and wanted:
+            raise UserError("excludes over", field="grid", hint="leave out one")
         if over is not None:
-            wanted = GridSection(name=over, object=over, height_m=height_m, spacing_m=spacing_m, margin_m=margin_m)
+            try:
+                wanted = GridSection(name=over, object=over, height_m=height_m, spacing_m=spacing_m, margin_m=margin_m)
+            except ValidationError as fault:
+                raise invalid(fault, "over") from fault
         settings, state = self._settings((1, 1), light, variant), variant or (light if isinstance(light, str) else "")
         with needing_extras(), progress_of(progress) as bar:
             return illuminated(

@@ -202,5 +202,10 @@ def test_a_scene_is_baked_and_illuminance_traced(tmp_path):
     assert isinstance(store, lambent.Store) and store.folder == tmp_path / "box.store"
     (floor,) = store.illuminance(over="floor", spacing_m=0.4, margin_m=0.1, error=0.05)
     assert floor.facts()["mean_lx"] > 0 and floor.lx.shape == floor.error_lx.shape
-    with pytest.raises(lambent.UserError, match="flor"):
-        store.illuminance(over="flor")
+    for wrong, message in (
+        ({"over": "flor"}, "flor"),
+        ({"over": "floor", "grid": "desk"}, "excludes over"),
+        ({"over": "floor", "spacing_m": -1.0}, "spacing_m"),
+    ):
+        with pytest.raises(lambent.UserError, match=message):
+            store.illuminance(**wrong)
