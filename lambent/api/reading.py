@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from lambent.core.errors import UserError
-from lambent.core.inputs import read_head
+from lambent.core.inputs import BUILTIN_PREFIX, read_head
 
 if TYPE_CHECKING:
     from lambent.api.luminaires import Luminaire
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from lambent.api.stores import Store
     from lambent.api.tables import Reconstruction, Table
 
-BUILTIN = "builtin:"
 HEAD_BYTES = 1 << 16  # a Mitsuba scene identifies itself within these
 PICTURES = (b"v/1\x01", b"#?RADIANCE", b"#?RGBE", b"\x89PNG", b"\xff\xd8\xff")
 Kind = Literal["scene", "store", "picture", "material", "luminaire", "table"]
@@ -85,7 +84,7 @@ def kind_of(file: str | Path) -> Kind:
     from lambent.materials.measured.registry import claims
 
     path = Path(file)
-    if str(file).startswith(BUILTIN):
+    if str(file).startswith(BUILTIN_PREFIX):
         return "scene"
     if path.is_dir():
         return "store"

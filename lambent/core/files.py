@@ -127,6 +127,14 @@ def _unwritable(path: Path, error: OSError) -> UserError:
     return UserError(f"cannot be written ({error.strerror or error})", file=path)
 
 
+def place_from(folder: Path, path: Path) -> str:
+    """A path as seen from a folder, with forward slashes; absolute on another drive of Windows."""
+    try:
+        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+    except ValueError:
+        return str(path.resolve())
+
+
 def write_text(path: Path, text: str) -> None:
     """Write `text` as UTF-8, atomically; surrogates, as in file names, are escaped."""
     with atomic_path(path) as beside:

@@ -74,6 +74,9 @@ def sha256_of(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+BUILTIN_PREFIX = "builtin:"  # of names of scenes that come with the package
+
+
 def read_head(path: Path, size: int) -> bytes:
     """The first bytes of a user's file, at most `size`."""
     with open_input(path) as file:

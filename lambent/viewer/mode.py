@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.errors import UserError
-from lambent.scenes.loaders.load import BUILTIN_PREFIX
+from lambent.core.inputs import BUILTIN_PREFIX
 from lambent.viewer.input import Input
 from lambent.viewer.screen import Rect, Screen
 

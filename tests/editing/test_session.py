@@ -295,12 +295,7 @@ def damaged(good: str) -> list[str]:
     return found
 
 
-def test_damaged_documents_are_read_or_refused(tmp_path: Path) -> None:
-    """Never another error; what is read is saved and read again."""
-    one, file = session(), tmp_path / "edits.json"
-    one.change("tray", with_node(TRAY, SHAPE, 0, 2.0))
-    one.merge("pot", "tray")
-    one.save(file)
+def assert_damage_is_read_or_refused(file: Path) -> None:
     for text in damaged(file.read_text()):
         file.write_text(text)
         try:
@@ -309,6 +304,15 @@ def test_damaged_documents_are_read_or_refused(tmp_path: Path) -> None:
             continue
         again.save(file)
         assert Session.open(file).document.materials == again.document.materials
+
+
+def test_damaged_documents_are_read_or_refused(tmp_path: Path) -> None:
+    """Never another error; what is read is saved and read again."""
+    one, file = session(), tmp_path / "edits.json"
+    one.change("tray", with_node(TRAY, SHAPE, 0, 2.0))
+    one.merge("pot", "tray")
+    one.save(file)
+    assert_damage_is_read_or_refused(file)
 
 
 def test_surroundings_say_what_an_environment_says() -> None:

@@ -9,7 +9,6 @@ session.save(Path("teapot.edits.json"))
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,7 +18,7 @@ from pydantic import ValidationError
 
 from lambent.core.discovery import known
 from lambent.core.errors import invalid
-from lambent.core.files import write_text
+from lambent.core.files import place_from, write_text
 from lambent.core.views.camera import Camera
 from lambent.editing.session.document import EditedMaterial, SessionDocument, load_document
 from lambent.editing.session.history import History, Steps
@@ -164,10 +163,7 @@ class Session:
         path = self.path(place)
         if Path(place).is_absolute() or not path.exists():
             return place
-        try:
-            return Path(os.path.relpath(path.resolve(), target.resolve())).as_posix()
-        except ValueError:  # another drive on Windows
-            return str(path.resolve())
+        return place_from(target, path)
 
 
 def with_materials(document: SessionDocument, materials: Mapping[str, Material]) -> SessionDocument:

@@ -19,7 +19,7 @@ import numpy as np
 
 from lambent.core.discovery import known, modules_in
 from lambent.core.errors import UserError
-from lambent.core.inputs import foreign_bytes
+from lambent.core.inputs import BUILTIN_PREFIX, foreign_bytes
 from lambent.materials.document import Material
 from lambent.scenes import builtin, loaders
 from lambent.scenes.loaders.contents import Contents, LoadOptions
@@ -31,7 +31,6 @@ from lambent.scenes.photometry.luminous_surfaces import with_luminous_surfaces
 from lambent.scenes.scene import MaterialTextures, Mesh, Scene, SceneObject
 from lambent.scenes.validation import size_warnings
 
-BUILTIN_PREFIX = "builtin:"
 TOML = ".toml"
 TOLD = 2  # objects named individually in warnings of one kind
 

@@ -13,6 +13,7 @@ from lambent.core.light.light_mix import LightMix, MixTrack
 from lambent.core.plain import Triple, plain_name
 from lambent.editing.session.document import SessionDocument
 from lambent.editing.session.history import History
+from lambent.editing.session.session import with_materials
 from lambent.materials.document import Material
 from lambent.scenes.lamp_edits import LampEdit
 from lambent.scenes.scene import ImageTexture
@@ -92,6 +93,10 @@ class MaterialEdits:
     def views(self) -> Mapping[str, SessionDocument]:
         """Views edited in place, by their camera's name; their materials are those of the room."""
         return self._history.now.views
+
+    def in_room(self, view: SessionDocument) -> SessionDocument:
+        """A view with the room's materials; those that the scene does not have stay."""
+        return with_materials(view, {name: self.current(name) for name in view.materials if name in self.scene})
 
     def change_view(self, view: SessionDocument) -> None:
         """Change a view, and the room's materials to those of the view, within the present stroke, or begin one."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from lambent.core.errors import UserError
 from lambent.editing.session.document import SessionDocument, document_from
-from lambent.editing.session.session import Session, with_materials
+from lambent.editing.session.session import Session
 from lambent.store.kept.images import names_of_images, readable, remove_unused
 from lambent.store.kept.session import FILE, FORMER_BACKUP, EditedView, KeptView, WalkSession, read_session
 from lambent.store.kept.states import images_of_variants
@@ -92,11 +92,8 @@ class SessionKeeper(SessionFile):
         of = view, self._edits.edited
         made = self._sections.get(name)
         if made is None or any(a is not b for a, b in zip(of, made[0], strict=True)):
-            known = {
-                material: self._edits.current(material) for material in view.materials if material in self._edits.scene
-            }
-            placed = Session(with_materials(view, known), self._folder or Path()).placed(self._folder or Path())
-            whole = placed.model_copy(update={"scene": "."})
+            folder = self._folder or Path()
+            whole = Session(self._edits.in_room(view), folder).placed(folder).model_copy(update={"scene": "."})
             made = self._sections[name] = of, EditedView(document=whole.model_dump(mode="json"))
         return made[1]
 

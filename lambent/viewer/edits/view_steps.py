@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from lambent.editing.session.document import SessionDocument
-from lambent.editing.session.session import with_materials
 from lambent.viewer.edits.edits import MaterialEdits
 
 
@@ -29,8 +28,8 @@ class ViewSteps:
         of = edits.views.get(self._begun.camera.name, self._begun), edits.edited
         if self._of is None or any(a is not b for a, b in zip(of, self._of, strict=True)):
             self._of = of
-            now = with_materials(of[0], {name: edits.current(name) for name in of[0].materials})
-            self._now = now.model_copy(update={"scene": self._begun.scene})  # a store's session names it "."
+            # A store's session names its scene ".".
+            self._now = edits.in_room(of[0]).model_copy(update={"scene": self._begun.scene})
         return self._now
 
     def change(self, state: SessionDocument) -> None:

@@ -10,12 +10,12 @@ from typing import Literal
 
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
-from lambent.core.inputs import read_head, sha256_of
+from lambent.core.inputs import BUILTIN_PREFIX, read_head, sha256_of
 from lambent.core.plain import plain_name, triple
 from lambent.core.views.camera import Camera, overview
 from lambent.editing.session.document import SessionDocument
 from lambent.editing.session.session import Session, with_materials
-from lambent.scenes.loaders.load import BUILTIN_PREFIX, is_scene, load_scene
+from lambent.scenes.loaders.load import is_scene, load_scene
 from lambent.scenes.scene import Scene
 from lambent.store.kept.session import RoomState, Surroundings, WalkSession
 from lambent.store.kept.views import read_views

@@ -20,6 +20,7 @@ from pathlib import Path
 
 from lambent.baking.interreflection.settings import Bounces
 from lambent.core.errors import UserError
+from lambent.core.files import place_from
 from lambent.editing.interreflection.noise import PASS, PassNoise
 from lambent.editing.session.session import Session
 from lambent.scenes.scene import Scene
@@ -102,8 +103,7 @@ def _note_environment(store: Store, session: Session) -> None:
     """Note in the store the image that lights it, so that the store can be opened without it."""
     said = session.document.environment
     if said is not None:
-        file = Path(os.path.relpath(session.path(said.file).resolve(), store.folder.resolve())).as_posix()
-        said = said.model_copy(update={"file": file})
+        said = said.model_copy(update={"file": place_from(store.folder, session.path(said.file))})
     store.set_document(SURROUNDINGS, said.model_dump(mode="json") if said else None)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from pydantic import ValidationError
 from lambent.baking.running.relit import relight_copy
 from lambent.baking.transport.view import View
 from lambent.core.errors import UserError, invalid
+from lambent.core.files import place_from
 from lambent.core.views.camera import Camera, overview
 from lambent.editing.relit_view import views_for_relighting
 from lambent.store.contract import baked_views, scene_record, view_key
@@ -48,10 +48,6 @@ def sky_of(path: Path, folder: Path, **how: Any) -> Surroundings:
     if path.suffix.lower() not in ENVIRONMENTS:
         raise UserError("is no sky", file=path, expected="an .hdr or .exr")
     try:
-        file = Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
-    except ValueError:  # another drive on Windows
-        file = str(path.resolve())
-    try:
-        return Surroundings(file=file, **how)
+        return Surroundings(file=place_from(folder, path), **how)
     except ValidationError as error:
         raise invalid(error, path) from error
