@@ -59,7 +59,7 @@ def scenes(names: Sequence[str], samples: int = 1024) -> None:
     """Path trace scenes for editing by their cameras, in the sizes of the published pictures; all without names."""
     from lambent.baking.engine import engine
     from lambent.baking.reference.path_traced import render_reference
-    from lambent.scenes import load_scene
+    from lambent.scenes.loaders.load import load_scene
 
     engine()
     for name in names or SCENES:
@@ -79,7 +79,7 @@ def edit() -> None:
     from lambent.editing.curves.nodes import Which, values_of, with_values
     from lambent.editing.session.session import Session
     from lambent.editing.stored import edited_picture
-    from lambent.scenes import load_scene
+    from lambent.scenes.loaders.load import load_scene
 
     scene, which = load_scene("builtin:teatray"), Which("shape")
     glaze = scene.materials["glaze"]
@@ -112,7 +112,7 @@ def interreflections(samples: int = 512) -> None:
     from lambent.editing.interreflection.whole import WholePicture
     from lambent.editing.session.session import Session
     from lambent.editing.stored import edited_picture
-    from lambent.scenes import load_scene
+    from lambent.scenes.loaders.load import load_scene
 
     scene, size = load_scene("builtin:cornell"), (450, 450)
     camera = scene.cameras[0]
@@ -156,7 +156,7 @@ def light_groups(store: Path | None = None) -> None:
     from lambent.baking.bake import bake
     from lambent.core.light.light_mix import parse_light
     from lambent.render import Settings, images
-    from lambent.scenes import load_scene
+    from lambent.scenes.loaders.load import load_scene
     from lambent.store.contract import scene_record
     from lambent.store.store import Store
 
@@ -187,7 +187,7 @@ def window(store: Path | None = None) -> None:
 
     from lambent.baking.bake import bake
     from lambent.core.light.light_mix import LightMix, parse_light
-    from lambent.scenes import load_scene
+    from lambent.scenes.loaders.load import load_scene
     from lambent.store.kept.session import FILE, RoomState, WalkSession, write_session
 
     large = PICTURES.parents[1] / "out" / "window"
@@ -241,7 +241,7 @@ def light_fields() -> None:
 
     from lambent.bench.oslf import FULL
     from lambent.bench.scenes.light_field_view import LightFieldView
-    from lambent.scenes import load_scene
+    from lambent.scenes.loaders.load import load_scene
 
     with TemporaryDirectory() as folder:
         store = Path(folder) / "store"

@@ -79,7 +79,7 @@ def mi() -> Any:
 def baked_box(mi: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a store of the built-in box."""
     from lambent.baking.bake import bake
-    from lambent.scenes import load_scene
+    from lambent.scenes.loaders.load import load_scene
     from tests.baking.small_scenes import TINY
 
     folder = tmp_path_factory.mktemp("baked") / "box.store"

@@ -10,7 +10,7 @@ from lambent.api.materials import Material
 from lambent.api.progress import Wanted, progress_of
 from lambent.core.extras import needing_extras
 from lambent.core.views.camera import Camera
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Scene as Contents
 
 if TYPE_CHECKING:

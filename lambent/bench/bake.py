@@ -23,7 +23,7 @@ import numpy as np
 from lambent.baking.quality import Quality, quality_named
 from lambent.core.light.colour import luminance
 from lambent.core.progress import Cancelled, Progress, silent
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Scene
 from lambent.store.store import Store
 

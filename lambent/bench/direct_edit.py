@@ -42,7 +42,7 @@ from lambent.materials.document import Material
 from lambent.materials.factored.curve import Curve
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Scene
 from lambent.store.contract import view_artefact_name
 from lambent.store.store import Store

@@ -47,7 +47,7 @@ from lambent.editing.session.session import Session
 from lambent.editing.stored import edited_picture
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Scene
 from lambent.store.store import Store
 

@@ -124,7 +124,7 @@ def _box(folder: Path, progress: Progress) -> Path:
     """The built-in box, baked coarsely: its texel values do not matter here."""
     from lambent.baking.bake import bake
     from lambent.baking.quality import quality_named
-    from lambent.scenes import load_scene
+    from lambent.scenes.loaders.load import load_scene
 
     coarse = quality_named("preview").changed("coarse", geometry={"texels": 128})
     bake(load_scene("builtin:box"), folder, quality=coarse, progress=progress)

@@ -30,7 +30,7 @@ from lambent.core.arrays import Floats
 from lambent.core.progress import Progress, part_of, silent
 from lambent.published.distance_impostors import fixed_point
 from lambent.published.surface_light_fields import Basis, basis_weights, surface
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 
 NAME = "oslf"
 POWERS = (1, 4, 8, 16)

@@ -130,7 +130,7 @@ def command(
     from lambent.baking.bake import bake
     from lambent.baking.light_fields.request import light_fields_of
     from lambent.editing.session.session import Session
-    from lambent.scenes import load_scene
+    from lambent.scenes.loaders.load import load_scene
     from lambent.scenes.scene import SunSky
     from lambent.scenes.sky.clear_sky import daylight_in_words
     from lambent.store.contract import LAST_RUN, TIMINGS

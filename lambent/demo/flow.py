@@ -43,8 +43,8 @@ from lambent.realtime.frame_state import FrameState
 from lambent.realtime.gpu.device import adapter_info, open_device
 from lambent.realtime.renderer import Renderer
 from lambent.render import Settings, images, write_frames
-from lambent.scenes import load_scene
 from lambent.scenes.camera_paths import camera_at, path_length
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Scene
 from lambent.store.store import Store
 

@@ -51,7 +51,7 @@ def parse_replacements(texts: Sequence[str]) -> tuple[Replacement, ...]:
 
 def mesh_of(file: str) -> Mesh:
     """All objects of a geometry file as one mesh."""
-    from lambent.scenes import load_scene
+    from lambent.scenes.loaders.load import load_scene
 
     objects = load_scene(file).objects
     mesh = merge(o.mesh for o in objects) if objects else None

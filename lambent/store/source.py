@@ -12,7 +12,7 @@ import numpy as np
 
 from lambent.core.errors import UserError
 from lambent.core.inputs import sha256_of
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import ImageEnvironment, Scene
 from lambent.store.contract import CUTS, SCENE, ObjectRecord, SceneRecord, scene_record
 from lambent.store.kept.session import Surroundings

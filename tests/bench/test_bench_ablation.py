@@ -16,7 +16,7 @@ from lambent.realtime.gpu import cube_mips, shader_source
 from lambent.realtime.incident import planes
 from lambent.realtime.integrators.integrators import INTEGRATORS
 from lambent.realtime.light import probe_lamps, probe_light
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 
 COARSE = quality_named("preview").changed("coarse", geometry={"texels": 64}, environment={"texels": 32})
 WHITE = Switch("colour.wgsl:srgb_encode", "    return vec3f(1.0);")

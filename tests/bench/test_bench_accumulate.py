@@ -14,7 +14,7 @@ from lambent.baking.bake import bake
 from lambent.baking.quality import quality_named
 from lambent.bench.measuring.reference import Reference
 from lambent.bench.pictures import accumulate, edits
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.store.store import Store
 from lambent.traced.room import TracedRoom
 

@@ -12,7 +12,8 @@ from lambent.baking.quality import quality_named
 from lambent.bench import answer
 from lambent.bench.measuring import answer_times
 from lambent.core.errors import UserError
-from lambent.scenes import builtin, load_scene
+from lambent.scenes import builtin
+from lambent.scenes.loaders.load import load_scene
 from tests.viewer.small_store import write_small_store
 
 SMALL = quality_named("preview").changed(

@@ -42,7 +42,7 @@ def test_the_rival_comes_closer_with_more_samples() -> None:
 
     engine()
     from lambent.baking.reference.path_traced import tracer_of
-    from lambent.scenes import load_scene
+    from lambent.scenes.loaders.load import load_scene
 
     scene = load_scene("builtin:teatray")
     view = tracer_of(scene, max_depth=1), scene.cameras[0], (48, 48)

@@ -14,7 +14,7 @@ from lambent.bench.registry import run_bench
 from lambent.core.errors import UserError
 from lambent.core.pictures.images import write_image
 from lambent.render import Settings, images
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.store.contract import scene_record
 from lambent.store.store import Store
 

@@ -16,8 +16,8 @@ from lambent.bench.measuring.reprojection import reprojected
 from lambent.bench.pictures import flicker
 from lambent.core.views.camera import Camera, pixel_rays
 from lambent.realtime.renderer import Renderer
-from lambent.scenes import load_scene
 from lambent.scenes.geometry import merge, patch
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Mesh
 
 BEFORE = Camera("before", (0.0, 0.0, 2.0), (0.0, 0.0, 0.0))

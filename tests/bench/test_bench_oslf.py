@@ -13,7 +13,7 @@ import pytest
 from lambent.bench import oslf
 from lambent.bench.scenes.light_field_view import Compared, LightFieldView
 from lambent.published.surface_light_fields import surface
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 
 TEXELS = 48
 

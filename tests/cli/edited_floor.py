@@ -9,7 +9,7 @@ import numpy as np
 from lambent.core.plain import triple
 from lambent.editing.session.session import Session
 from lambent.materials.document import Material
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 
 SIZE = (24, 16)
 SCENE = """

@@ -13,7 +13,7 @@ import pytest
 
 from lambent.baking.bake import bake
 from lambent.core.outputs import is_marked
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.store.store import Store
 from tests.baking.small_scenes import TINY
 from tests.traced.lit_grids import CANDELA, PLANE, VERTICAL_DEG, lux_from, write_hall

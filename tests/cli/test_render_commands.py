@@ -21,8 +21,8 @@ from lambent.core.views.camera import Camera, CameraPath
 from lambent.editing.session.document import Surroundings
 from lambent.editing.session.session import Session
 from lambent.materials.document import Material
-from lambent.scenes import load_scene
 from lambent.scenes.geometry import placed, sphere
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Look, Scene, SceneObject, Variant
 from lambent.store.store import Store
 from tests.baking.small_scenes import TINY, room_with_step

@@ -11,7 +11,7 @@ from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.inspecting.synthetic import Setup, synthesise
 from lambent.materials.measured.parts.gonio_text import write_gonio
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from tests.cli.edited_floor import saved, write_floor
 from tests.viewer.small_store import write_small_store
 

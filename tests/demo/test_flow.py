@@ -16,7 +16,7 @@ from lambent.core.pictures.images import read_encoded
 from lambent.core.progress import Cancelled, silent
 from lambent.demo.flow import PACE_M_S, SPECIMEN_OF, STILLS, Effort, Flow, walked
 from lambent.materials.document import load_material
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.store.store import Store
 
 TINY = Effort(

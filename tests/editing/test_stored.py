@@ -17,7 +17,7 @@ from lambent.editing.stored import edited_picture
 from lambent.materials.document import Lobe, Material
 from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.terms import Editable
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.store.contract import SceneRecord, view_artefact_name, write_scene_record
 from lambent.store.store import Store
 from tests.editing.pulled_materials import with_node

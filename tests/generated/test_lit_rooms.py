@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from tests.generated.lit_rooms import LIT_ROOMS, written
 
 LIGHTS = {"foyer": 1, "stair": 3, "office": 16, "shop": 24, "warehouse": 60}

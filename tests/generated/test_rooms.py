@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from tests.generated.rooms import ROOMS, written
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from tests.generated.torchiere import written
 
 

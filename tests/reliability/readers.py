@@ -23,12 +23,13 @@ from lambent.materials.document import Lobe, Material, Provenance, load_material
 from lambent.materials.measured import load
 from lambent.materials.measured.inspecting import inspection
 from lambent.published.merl_fits import read_fits
-from lambent.scenes import load_scene, sample_path, validate
-from lambent.scenes.loaders.load import formats
+from lambent.scenes.camera_paths import sample_path
+from lambent.scenes.loaders.load import formats, load_scene
 from lambent.scenes.looks.textures import digest, parts, prepared
 from lambent.scenes.reflectors import find_reflectors
 from lambent.scenes.scene import ImageEnvironment, MaterialTextures, Scene, Texture
 from lambent.scenes.sky.environments import from_lat_long
+from lambent.scenes.validation import validate
 from lambent.store.contract import SceneRecord, baked_views, scene_record, write_scene_record
 from lambent.store.kept.views import read_views, with_views
 from lambent.store.plans import plan_of

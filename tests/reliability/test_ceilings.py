@@ -29,7 +29,7 @@ from lambent.core.pictures.images import read_encoded, read_image
 from lambent.materials.document import load_material
 from lambent.materials.measured.registry import load
 from lambent.published.merl_fits import read_fits
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.store.kept.session import read_session
 from lambent.store.kept.views import read_views
 from lambent.viewer.editor.files import kind_of

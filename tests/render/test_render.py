@@ -88,7 +88,7 @@ def test_notes_say_what_is_wrong_with_a_store(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_the_path_tracer_sees_the_scene_that_was_baked(mi, tmp_path: Path) -> None:
     from lambent.baking.bake import bake
-    from lambent.scenes import load_scene
+    from lambent.scenes.loaders.load import load_scene
     from lambent.store.source import SOURCE
 
     made = bake(load_scene("builtin:box"), tmp_path / "box", only=("geometry",))

@@ -20,8 +20,8 @@ from lambent.core.pictures.images import read_image, write_shown
 from lambent.core.views.camera import Camera
 from lambent.realtime.frame_state import FrameState
 from lambent.render import Settings, as_left, images, still
-from lambent.scenes import load_scene
 from lambent.scenes.lamp_edits import LampEdit
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import ImageTexture
 from lambent.store.kept.images import kept_image
 from lambent.store.kept.session import FILE, KeptLook, KeptView, RoomState, WalkSession, read_session, write_session

@@ -15,7 +15,7 @@ from lambent.core.light.light_mix import parse_light
 from lambent.core.pictures.images import read_image
 from lambent.core.views.projections import Projection
 from lambent.render import Settings, film, images, still
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.store.contract import scene_record
 from lambent.store.source import SOURCE
 from lambent.store.store import Store

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from lambent.core.views.camera import Camera, CameraPath
-from lambent.scenes import sample_path
-from lambent.scenes.camera_paths import camera_at, path_length
+from lambent.scenes.camera_paths import camera_at, path_length, sample_path
 from lambent.scenes.first_view import content_bounds, first_views
 from lambent.scenes.geometry.shapes import box
 from lambent.scenes.scene import SceneObject

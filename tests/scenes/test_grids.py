@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.scenes import load_scene
 from lambent.scenes.geometry import box, merge, patch, placed
 from lambent.scenes.grids import Grid
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.loaders.scene_toml.grids import GridSection, cells_of
 from lambent.scenes.scene import SceneObject
 from tests.baking.small_scenes import turned_inwards

@@ -7,9 +7,9 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.materials.document import Material
-from lambent.scenes import load_scene
 from lambent.scenes.geometry import patch
 from lambent.scenes.light_groups import MOST_GROUPS, OTHERS, groups_before_bake, names_of_lights, sorted_lights
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import (
     ConstantEnvironment,
     DirectionalLight,

@@ -10,8 +10,8 @@ import pytest
 
 from lambent.materials.clear import clear_terms, transmittance
 from lambent.materials.document import Lobe, Material
-from lambent.scenes import load_scene
 from lambent.scenes.geometry import patch
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.panes import panes_of
 from lambent.scenes.scene import MaterialTextures, Scene, SceneObject, Texture
 from tests.scenes.loaders.gltf.test_gltf import loaded, textured

@@ -9,9 +9,10 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
-from lambent.scenes import load_scene, reflectors
+from lambent.scenes import reflectors
 from lambent.scenes.floor_plan import STEPS, FloorPlan
 from lambent.scenes.geometry import box, merge, patch, placed, sphere, turn
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.reflectors import find_reflectors
 from lambent.scenes.scene import Mesh, ReflectorRule, Scene, SceneObject
 from lambent.store.plans import plan_of, plan_record

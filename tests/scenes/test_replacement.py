@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.replacement import parse_replacements, with_replacements
 
 TRIANGLES = "v 0 0 0\nv 2 0 0\nv 0 4 0\nv 0 0 2\nf 1 2 3\no other\nf 1 3 4\n"

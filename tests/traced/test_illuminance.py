@@ -14,8 +14,8 @@ from lambent.core.light.glare import glare
 from lambent.core.light.photometry import LM_PER_W, photometric
 from lambent.core.views.panorama import Panorama
 from lambent.core.views.projections import Projection, View
-from lambent.scenes import load_scene
 from lambent.scenes.geometry import box, patch, placed, sphere
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import ConstantEnvironment, DirectionalLight, Scene, SceneObject
 from lambent.store.store import Store
 from lambent.traced.picture import TracedPicture

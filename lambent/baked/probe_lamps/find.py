@@ -9,7 +9,7 @@ wide lobes; the sun is first separated from the window it shines through.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,7 @@ class Lamp:
     flux: Floats
     radius_rad: float
 
-    @property
+    @cached_property
     def power(self) -> float:
         """Luminance of its flux."""
         return float(luminance(self.flux).sum())
@@ -85,7 +85,7 @@ def _halves(lamp: Lamp, omega: Floats, n: int) -> list[Lamp]:
     if peak > CONTRAST * median:
         first = bright > np.sqrt(peak * median)
     else:
-        w = normalize(corners(lamp.texels, n)).mean(axis=1)
+        w = corners(n)[lamp.texels].mean(axis=1)
         mean, covariance = moments(w, luminance(lamp.flux))
         first = (w - mean) @ np.linalg.eigh(covariance)[1][:, -1] < 0
     return [_lamp(lamp.texels[part], lamp.excess[part], omega, n) for part in (first, ~first)]
@@ -121,17 +121,20 @@ def _search(rest: Floats, omega: Floats, n: int, total: float, times: float) -> 
 
 def _around(rest: Floats, texels: NDArray[np.intp], bright: NDArray[np.intp], beside: NDArray[np.intp]) -> Floats:
     """(3,) median of the ring of dim texels around `texels`; 0 without a ring."""
-    inside = np.unique(texels)
-    reached = inside
+    ring = np.zeros(len(rest), bool)
+    ring[texels] = True
+    reached = texels
     for _ in range(RING):
-        reached = np.union1d(reached, beside[reached].ravel())
-    ring = np.setdiff1d(reached, inside)
-    ring = ring[bright[ring] < 0]
-    return np.median(rest[ring], axis=0) if len(ring) else np.zeros(3)
+        reached = beside[reached].ravel()
+        reached = reached[~ring[reached]]
+        ring[reached] = True
+    ring[texels] = False
+    ring &= bright < 0
+    return np.median(rest[ring], axis=0) if ring.any() else np.zeros(3)
 
 
 def _radius(texels: NDArray[np.intp], flux: Floats, n: int) -> float:
-    w = normalize(corners(texels, n)).reshape(-1, 3)
+    w = corners(n)[texels].reshape(-1, 3)
     return float(np.sqrt(2 * np.linalg.eigvalsh(moments(w, np.repeat(luminance(flux), 4))[1])[-1]))
 
 
@@ -143,13 +146,14 @@ def moments(points: Floats, weight: Floats) -> tuple[Floats, Floats]:
     return mean, (about * weight[:, None]).T @ about
 
 
-def corners(texels: NDArray[np.intp], n: int) -> Floats:
-    """(K, 4, 3) directions, largest component 1, of four points per texel with the variance of its area."""
-    face, row, column = np.unravel_index(texels, (6, n, n))
+@lru_cache(4)
+def corners(n: int) -> Floats:
+    """(6 n n, 4, 3) unit directions of four points of each texel, with the variance of its area."""
     step = np.array([[-CORNER, -CORNER], [-CORNER, CORNER], [CORNER, -CORNER], [CORNER, CORNER]]) / n
-    s, t = (((place + 0.5) / n * 2 - 1)[:, None] + step[:, k] for k, place in enumerate((column, row)))
-    shape = s.shape
-    return directions_at(np.broadcast_to(face[:, None], shape).ravel(), s.ravel(), t.ravel()).reshape(*shape, 3)
+    row, column = np.indices((n, n)).reshape(2, -1, 1)
+    s, t = ((place + 0.5) / n * 2 - 1 + step[:, k] for k, place in enumerate((column, row)))
+    faces = [directions_at(np.full(s.shape, face), s, t) for face in range(6)]
+    return normalize(np.concatenate(faces))
 
 
 @lru_cache(4)

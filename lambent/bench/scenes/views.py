@@ -18,7 +18,7 @@ from lambent.store.store import Store
 def inputs_or_baked(inputs: Sequence[Path], scene: str, progress: Progress) -> Iterator[list[Store]]:
     """The inputs, which are baked stores; without inputs, a scene baked here in `preview`."""
     from lambent.baking.bake import bake
-    from lambent.scenes import load_scene
+    from lambent.scenes.loaders.load import load_scene
 
     with tempfile.TemporaryDirectory() as folder:
         stores = [Store.open(path) for path in inputs]

@@ -22,7 +22,7 @@ def face_directions(n: int) -> Floats:
 
 def directions_at(face: NDArray[np.integer], s: Floats, t: Floats) -> Floats:
     """Directions (..., 3) (largest component 1) at face coordinates s, t in [-1, 1], t downwards."""
-    return np.asarray(np.take_along_axis(_on_all_faces(s, t), face[None, ..., None], axis=0)[0])
+    return np.stack([np.choose(face, choices) for choices in zip(*faces_at(s, t), strict=True)], axis=-1)
 
 
 def faces_at(s: Any, t: Any) -> list[tuple[Any, Any, Any]]:

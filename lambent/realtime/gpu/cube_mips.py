@@ -11,9 +11,11 @@ by the same factor: the blur keeps its size and is nearly round. It gains 2.5 dB
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
 from lambent.core.geometry.cubemap import directions_at, sample, texel_solid_angles
@@ -31,11 +33,16 @@ def halved(cube: Floats) -> Floats:
     m = n // 2
     if n % 2 == 0:
         omega = texel_solid_angles(n)[:, :, None].astype(cube.dtype)
-        light = (cube * omega).reshape(6, m, 2, m, 2, -1).sum(axis=(2, 4))
-        return np.asarray(light / omega.reshape(m, 2, m, 2, 1).sum(axis=(1, 3)))
+        return np.asarray(_four_texels(cube * omega) / _four_texels(omega[None]))
     share, omega = overlaps(n, m), texel_solid_angles(n)
     light = np.einsum("ij,fjkc,lk->filc", share, cube * omega[..., None], share, optimize=True)
     return np.asarray(light / (share @ omega @ share.T)[..., None], dtype=cube.dtype)
+
+
+def _four_texels(values: Floats) -> Floats:
+    """(F, n / 2, n / 2, C) sums of two by two texels of values (F, n, n, C)."""
+    rows = values[:, ::2] + values[:, 1::2]
+    return np.asarray(rows[:, :, ::2] + rows[:, :, 1::2])
 
 
 def overlaps(n: int, m: int) -> Floats:
@@ -80,11 +87,17 @@ def _with_border(cube: Floats, by: int) -> Floats:
     """Every face padded by `by` texels on all sides from the neighbouring faces."""
     n = cube.shape[1]
     wide = np.pad(cube, ((0, 0), (by, by), (by, by), (0, 0)))
-    row, column = np.nonzero(np.pad(np.zeros((n, n), bool), by, constant_values=True))
-    place = (np.stack([column, row]) - by + 0.5) / n * 2 - 1
-    for face in range(6):
-        wide[face, row, column] = sample(cube, directions_at(np.full(len(row), face), *place))
+    row, column, w = _border(n, by)
+    wide[:, row, column] = sample(cube, w)
     return wide
+
+
+@lru_cache(16)
+def _border(n: int, by: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
+    """Row and column (K,) of the texels `by` wide around a face, and their directions (6, K, 3) from every face."""
+    row, column = np.nonzero(np.pad(np.zeros((n, n), bool), by, constant_values=True))
+    s, t = (np.stack([column, row]) - by + 0.5) / n * 2 - 1
+    return row, column, np.stack([directions_at(np.full(len(row), face), s, t) for face in range(6)])
 
 
 def finite(array: Floats) -> tuple[Floats, int]:

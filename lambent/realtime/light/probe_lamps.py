@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 from lambent.baked.probe_lamps.find import MOST, Lamp, corners, find_lamps, moments
 from lambent.core.arrays import Floats
 from lambent.core.geometry.cubemap import texel_solid_angles
-from lambent.core.geometry.directions import normalize
 from lambent.core.light.colour import luminance
 from lambent.materials.document import Lobe, Material
 from lambent.materials.lobes import widths
@@ -145,7 +144,7 @@ def groups_out(lobe: Lobe, radii: Floats) -> float:
 
 def placed(lamp: Lamp, group: int, n: int, probe: Probe, look_up: LookUp) -> Floats:
     """Rows (LAMP_ROWS, 4) of a lamp in a cube map with n x n faces, positioned by the distances of a look-up."""
-    w = normalize(corners(lamp.texels, n).reshape(-1, 3))
+    w = corners(n)[lamp.texels].reshape(-1, 3)
     weight = np.repeat(luminance(lamp.flux), 4)
     distance = look_up.distances(probe, w)
     near = np.isfinite(distance)

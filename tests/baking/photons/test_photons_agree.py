@@ -15,8 +15,8 @@ from lambent.core.errors import UserError
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.inspecting.synthetic import Setup, synthesise
 from lambent.materials.measured.parts.gonio_text import write_gonio
-from lambent.scenes import load_scene
 from lambent.scenes.geometry import box, patch, placed, sphere
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.store.store import Store
 from tests.baking.small_scenes import GREY, TINY, turned_inwards

@@ -10,8 +10,8 @@ from lambent.baking.transport.view import View
 from lambent.core.errors import UserError
 from lambent.core.light.light_mix import GroupMix, LightMix
 from lambent.editing.relit_view import RelitView
-from lambent.scenes import load_scene
 from lambent.scenes.lamp_edits import LampEdit
+from lambent.scenes.loaders.load import load_scene
 from lambent.store.kept.session import RoomState
 from lambent.store.source import scene_of
 from lambent.store.store import Store

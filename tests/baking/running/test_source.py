@@ -15,8 +15,8 @@ from lambent.cli.main import run
 from lambent.core.errors import UserError
 from lambent.core.pictures.images import read_image
 from lambent.materials.document import Material
-from lambent.scenes import load_scene
 from lambent.scenes.geometry import box
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import MaterialTextures, Scene, SceneObject, Texture
 from lambent.store.source import changed_inputs, scene_of
 from lambent.store.store import Store

@@ -6,7 +6,7 @@ import numpy as np
 
 from lambent.baking.bake import bake
 from lambent.baking.running.watch import Watch
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.viewer.modes.walk.rebake.arrivals import Arrivals, Region
 from tests.baking.small_scenes import TINY
 

@@ -11,8 +11,8 @@ from lambent.baking.surfaces.atlas import Atlas, merged, unwrap
 from lambent.baking.surfaces.layers import APART, BEHIND, in_first_layer, layers_of, lie_flat
 from lambent.core.arrays import Floats, Indices
 from lambent.core.geometry.triangles import cross_2d, triangle_areas
-from lambent.scenes import load_scene
 from lambent.scenes.geometry import lathe, merge, placed, sphere, teapot
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Mesh, Scene, SceneObject
 
 TEXELS = 192

@@ -26,8 +26,8 @@ from lambent.materials.factored.of_lobes import of_material
 from lambent.materials.factored.parametrisations import angle_of
 from lambent.materials.factored.terms import Editable
 from lambent.materials.lobes import NUMPY
-from lambent.scenes import load_scene
 from lambent.scenes.geometry import patch, placed, sphere
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.scenes.sky.triangle_lights import TriangleLights, environment_triangles, solid_angles, surface_triangles
 from tests.baking.small_scenes import GREY

@@ -15,8 +15,8 @@ from lambent.core.arrays import Floats
 from lambent.realtime.answering.answering import AnsweredLight
 from lambent.realtime.answering.texture_detail import Textures, filtered, with_own_albedos
 from lambent.realtime.light.baked import BakedScene, read_baked
-from lambent.scenes import load_scene
 from lambent.scenes.geometry import box, patch, placed, sphere
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.looks.image_textures import mean_and_detail, with_image
 from lambent.scenes.scene import ImageTexture, MaterialTextures, Texture
 from lambent.store.store import Store

@@ -15,13 +15,15 @@ from lambent.core.geometry.triangles import triangle_areas, triangle_normals
 from lambent.core.plain import triple
 from lambent.core.views.camera import Camera
 from lambent.materials.bsdf import MaterialBSDF
-from lambent.scenes import builtin, load_scene, sample_path, validate
+from lambent.scenes import builtin
 from lambent.scenes.builtin import cornell, earrings, loft
 from lambent.scenes.builtin.things import block
-from lambent.scenes.camera_paths import path_length
+from lambent.scenes.camera_paths import path_length, sample_path
 from lambent.scenes.geometry import signed_volume
 from lambent.scenes.geometry.drape import Drape
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import ConstantEnvironment, Mesh, Scene, SceneObject
+from lambent.scenes.validation import validate
 from tests.scenes.geometry.test_geometry import boundary_edges
 
 

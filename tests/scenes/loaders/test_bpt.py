@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.scenes import load_scene
 from lambent.scenes.geometry import signed_volume, teapot
 from lambent.scenes.loaders import bpt
+from lambent.scenes.loaders.load import load_scene
 from tests.scenes.geometry.test_geometry import TEAPOT, sheet
 
 

@@ -10,9 +10,9 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import normalize
-from lambent.scenes import load_scene, loaders
+from lambent.scenes import loaders
 from lambent.scenes.loaders.contents import DAYLIGHT, Contents
-from lambent.scenes.loaders.load import counted, formats, is_scene
+from lambent.scenes.loaders.load import counted, formats, is_scene, load_scene
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.placing import placed
 from lambent.scenes.photometry.files import parse_luminaire

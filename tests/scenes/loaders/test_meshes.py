@@ -14,8 +14,8 @@ from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.triangles import triangle_normals
 from lambent.materials.document import Lobe, Material
-from lambent.scenes import load_scene
 from lambent.scenes.geometry import box, cylinder, merge, placed, signed_volume, sphere, turn
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.loaders.meshes.flush import RAISED, with_flush_raised
 from lambent.scenes.loaders.meshes.repair import creased, deviating_faces
 from lambent.scenes.scene import Mesh, Scene, SceneObject

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from tests.scenes.loaders.gltf.test_gltf import loaded, textured
 from tests.scenes.loaders.mitsuba.test_scene_mitsuba import written
 from tests.scenes.loaders.pictures import png

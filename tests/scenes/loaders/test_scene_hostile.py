@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.loaders.mitsuba import load as read_mitsuba
 from lambent.scenes.loaders.mitsuba import serialized
 from lambent.scenes.loaders.ply import UV_NAMES

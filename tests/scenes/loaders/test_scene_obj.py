@@ -11,9 +11,9 @@ import trimesh
 from lambent.core.errors import UserError
 from lambent.core.geometry.triangles import triangle_areas
 from lambent.materials.bsdf import MaterialBSDF
-from lambent.scenes import load_scene
 from lambent.scenes.geometry import signed_volume
 from lambent.scenes.loaders.contents import Contents
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.loaders.obj import load as read_obj
 from lambent.scenes.loaders.obj import text as obj_text
 from tests.scenes.loaders.pictures import png

@@ -13,8 +13,8 @@ from lambent.core.geometry.triangles import triangle_areas
 from lambent.core.light.exposure import exposure_of
 from lambent.core.light.photometry import photometric
 from lambent.materials.document import Material
-from lambent.scenes import load_scene
 from lambent.scenes.geometry import patch
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.loaders.scene_toml.assembly import assigned
 from lambent.scenes.scene import (
     ConstantEnvironment,

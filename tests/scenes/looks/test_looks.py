@@ -12,8 +12,8 @@ from lambent.core.errors import UserError
 from lambent.core.light.light_mix import GroupMix
 from lambent.core.pictures.images import write_shown
 from lambent.materials.document import Material
-from lambent.scenes import load_scene
 from lambent.scenes.geometry import patch
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.looks import textures
 from lambent.scenes.looks.variants import VariantByObject, textures_in_looks, variant_named, with_variants
 from lambent.scenes.scene import ImageTexture, Look, MaterialTextures, Scene, SceneObject, Texture

@@ -10,7 +10,7 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.light.photometry import photometric
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.photometry.files import is_luminaire, read_luminaire
 from lambent.scenes.scene import IesLight
 from tests.scenes.loaders.gltf.test_gltf_luminaires import lit, node

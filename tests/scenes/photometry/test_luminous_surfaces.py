@@ -9,7 +9,7 @@ import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.geometry.triangles import triangle_areas, triangle_normals
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Scene
 
 SCENE = """format = "lambent-scene"

@@ -15,7 +15,7 @@ from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.latlong import lat_long_directions
 from lambent.core.geometry.triangles import triangle_areas, triangle_normals
 from lambent.core.pictures.images import write_image
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import ComputedEnvironment
 from lambent.scenes.sky import environment_images
 from lambent.scenes.sky.computed import COMPUTED, HEIGHT, SUN, lat_long_image

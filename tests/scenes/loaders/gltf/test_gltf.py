@@ -20,11 +20,12 @@ from lambent.core.errors import UserError
 from lambent.core.light.photometry import ILLUMINANCE, photometric
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
-from lambent.scenes import load_scene, validate
 from lambent.scenes.geometry import signed_volume
 from lambent.scenes.loaders.contents import DAYLIGHT
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.loaders.surfaces.material_builder import masking
 from lambent.scenes.scene import DirectionalLight, PointLight, Scene
+from lambent.scenes.validation import validate
 from tests.scenes.loaders.pictures import png
 
 TURNS = [0.2, 0.6, -0.3, 0.8], [0.5, -0.1, 0.7, 0.5]

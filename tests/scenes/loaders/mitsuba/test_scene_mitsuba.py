@@ -15,7 +15,7 @@ from lambent.core.pictures.images import write_image
 from lambent.core.views.camera import camera_axes
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material
-from lambent.scenes import load_scene, validate
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import (
     SUN_RADIUS_DEG,
     ConstantEnvironment,
@@ -25,6 +25,7 @@ from lambent.scenes.scene import (
     Scene,
     SunSky,
 )
+from lambent.scenes.validation import validate
 from tests.scenes.loaders.pictures import png
 
 BALL = '<shape type="sphere" id="ball"/>'

@@ -14,7 +14,7 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.measured.parts.spectral import rgb_of_spectra
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.loaders.mitsuba.fresnel import METALS, fresnel
 from tests.tools.bsdf_distance import ByFormula, InMitsuba, distance, peak, towards
 

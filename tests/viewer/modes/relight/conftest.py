@@ -8,7 +8,7 @@ import pytest
 from lambent.baking.bake import bake
 from lambent.baking.transport.view import View
 from lambent.core.pictures.images import write_image
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.store.kept.session import FILE, RoomState, WalkSession, write_session
 from lambent.store.store import Store
 from lambent.viewer.edits.shown import OnHost

@@ -8,7 +8,7 @@ import pytest
 from lambent.core.errors import UserError
 from lambent.core.light.light_mix import GroupMix, LightMix
 from lambent.editing.relit_view import RelitView
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import ImageEnvironment
 from lambent.store.kept.session import FILE, RelitSky, read_session
 from lambent.store.store import MANIFEST, Store

@@ -8,7 +8,7 @@ from lambent.baking.transport.view import View
 from lambent.cli.main import run
 from lambent.core.pictures.images import read_image
 from lambent.editing.relit_view import RelitView
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import ImageEnvironment
 from lambent.store.kept.session import FILE, RoomState, read_session
 from lambent.store.store import Store

@@ -6,7 +6,7 @@ import pytest
 from lambent.baking.bake import bake
 from lambent.core.pictures.images import write_image
 from lambent.core.views.camera import Camera
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.viewer.modes.walk.mode import open_store
 from tests.baking.small_scenes import TINY
 from tests.viewer.drawn_frames import drawn, until

@@ -13,7 +13,7 @@ from lambent.core.pictures.images import read_image
 from lambent.core.views.camera import CameraPath
 from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.store.store import Store
 from lambent.traced.picture import ENDED, TracedPicture
 from lambent.viewer.modes.walk.at_rest.traced import FADE_S, STILL_S

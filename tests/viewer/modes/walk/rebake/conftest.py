@@ -3,7 +3,7 @@
 import pytest
 
 from lambent.baking.bake import bake
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from tests.baking.small_scenes import TINY
 from tests.viewer.modes.walk.rebake.recorded_bakes import Box, painted
 

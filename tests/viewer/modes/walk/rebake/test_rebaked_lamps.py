@@ -12,8 +12,8 @@ from lambent.realtime.frame_state import FrameState
 from lambent.realtime.gpu.device import open_device
 from lambent.realtime.light.baked import read_baked
 from lambent.realtime.renderer import Renderer
-from lambent.scenes import load_scene
 from lambent.scenes.lamp_edits import LampEdit, with_lamp_edits
+from lambent.scenes.loaders.load import load_scene
 from lambent.store.source import scene_of
 from lambent.store.store import Store
 from lambent.viewer.modes.walk.at_rest.tracing import Wish

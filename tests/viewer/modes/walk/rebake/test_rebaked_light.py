@@ -13,7 +13,7 @@ from lambent.materials.document import Lobe
 from lambent.realtime.gpu.device import open_device
 from lambent.realtime.light.baked import read_baked
 from lambent.realtime.renderer import Renderer
-from lambent.scenes import load_scene
+from lambent.scenes.loaders.load import load_scene
 from lambent.store.store import Store
 from lambent.viewer.modes.walk.rebake.arrivals import Arrived, Region
 from lambent.viewer.modes.walk.rebake.rebaked_light import (
