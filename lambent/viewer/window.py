@@ -6,8 +6,7 @@ Importing this needs a display.
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import Any
 
 import glfw
@@ -17,18 +16,16 @@ from imgui_bundle import imgui
 from rendercanvas.glfw import RenderCanvas, loop
 
 from lambent.viewer import layout
+from lambent.viewer.canvas.frames import EVENTS, SETTLE_FRAMES, Frames
 from lambent.viewer.gamepad import GlfwPads, PadWatch
 from lambent.viewer.interface import renderer
 from lambent.viewer.mode import Image, Mode
 from lambent.viewer.pacing import Beat
-from lambent.viewer.screen import least
 from lambent.viewer.settings import settings_file
 
 MAX_FPS = 60
 BEFORE_IMGUI = -100  # Dear ImGui's handlers (order -99) stop events, which would hide hovers from ours
-SETTLE_FRAMES = 3  # Dear ImGui shows what an event did one or two frames later
 FOR_IMGUI_ONLY = ("char", "resize")
-EVENTS = ("pointer_down", "pointer_move", "pointer_up", "pointer_leave", "wheel", "key_down", "key_up", *FOR_IMGUI_ONLY)
 
 
 def _interrupt_between_frames() -> None:
@@ -42,12 +39,13 @@ def _interrupt_between_frames() -> None:
         signal.signal(signal.SIGINT, lambda number, stack: loop.call_soon(close, number, stack))
 
 
-class Window:
+class Window(Frames):
     """One window of rendercanvas with Dear ImGui. `run` shows it until it is closed."""
 
     def __init__(self, mode: Mode, *, size: tuple[int, int], frames: int | None = None) -> None:
-        self.mode, self.screen, self._frames, self._device = mode, mode.screen, frames, mode.drawing.device
-        self.canvas = RenderCanvas(size=size, title=f"Lambent: {mode.title}", max_fps=MAX_FPS)
+        canvas = RenderCanvas(size=size, title=f"Lambent: {mode.title}", max_fps=MAX_FPS)
+        super().__init__(mode, canvas, loop)
+        self._frames, self._device = frames, mode.drawing.device
         context = self.canvas.get_wgpu_context()
         # Not an sRGB format: Dear ImGui blends encoded colours, and the picture is already encoded.
         surface = context.get_preferred_format(self._device.adapter).removesuffix("-srgb")
@@ -60,16 +58,9 @@ class Window:
         self._textures: dict[str, Any] = {}  # Dear ImGui textures, by the layout's names
         self._made_of: dict[str, Any] = {}  # the view or array that each texture shows
         self._popup_open = False
-        self._extra_frames = 0
-        self._told: list[str] = []  # messages of the last frame
-        self._drawn_s = self.screen.clock()
         self._beat = Beat(1 / MAX_FPS)
-        self._moving = False  # whether something moves between this frame and the next
-        self._wake_at_s: float | None = None
         self._error: Exception | None = None
-        self.canvas.add_event_handler(self._on_event, *EVENTS, order=BEFORE_IMGUI)
-        self._woken = False  # by background work, since the last frame
-        self.screen.wake = self._wake
+        self.canvas.add_event_handler(self._on_event, *EVENTS, *FOR_IMGUI_ONLY, order=BEFORE_IMGUI)
         self.screen.remembered.open(settings_file())
         glfw.set_drop_callback(self.canvas._window, self._dropped)  # type: ignore[arg-type]
         self._take_the_close_button()
@@ -85,50 +76,28 @@ class Window:
         if self._error is not None:
             raise self._error
 
-    @contextmanager
-    def _watched(self) -> Iterator[None]:
-        """Close at the first error, which `run` raises; the event loop would only log it.
+    def _failed(self, error: Exception) -> None:
+        """Close at the first error, which `run` raises; the event loop would only log it."""
+        self._error = self._error or error
+        loop.call_soon(self.canvas.close)
 
-        A frame for which the display has no image in time is skipped by the canvas, and drawn again.
-        """
-        try:
-            yield
-        except wgpu.DrawCancelled:
-            self.canvas.request_draw()
-            raise
-        except Exception as error:  # noqa: BLE001
-            self._error = self._error or error
-            loop.call_soon(self.canvas.close)
-
-    def _on_event(self, event: dict[str, Any]) -> None:
-        self._extra_frames, self.screen.pace.touched_s = SETTLE_FRAMES, self.screen.clock()
-        self.canvas.request_draw()
-        if event["event_type"] in FOR_IMGUI_ONLY:
-            return
-        with self._watched():
-            io = self._imgui.backend.io
-            has_keys = io.want_text_input or io.want_capture_keyboard or self.screen.asks_to_close
-            self.mode.input.handle(event, ui_has_mouse=self._popup_open, ui_has_keys=has_keys)
+    @property
+    def _captured(self) -> tuple[bool, bool]:
+        io = self._imgui.backend.io
+        return self._popup_open, io.want_text_input or io.want_capture_keyboard or self.screen.asks_to_close
 
     def _draw(self) -> None:
-        with self._watched():
-            # The canvas sleeps from the start of a frame and wakes late; without correction, delays add up.
-            self.canvas.set_update_mode("ondemand", max_fps=1 / self._beat.wait_s(self.screen.clock()))
-            self._advance()
-            self._show()
-            self._schedule()
+        # The canvas sleeps from the start of a frame and wakes late; without correction, delays add up.
+        self.canvas.set_update_mode("ondemand", max_fps=1 / self._beat.wait_s(self.screen.clock()))
+        super()._draw()
 
-    def _advance(self) -> None:
-        """Advance the mode to the present time."""
-        now_s = self.screen.clock()
-        since_last_s, self._drawn_s = now_s - self._drawn_s, now_s
+    def _advance(self, since_last_s: float) -> None:
         self.mode.input.steer(self._pad.now, since_last_s if self._moving else 0.0)
-        self.mode.advance(since_last_s if self._moving else 0.0)  # a sleep before the first step is no walking
+        super()._advance(since_last_s)
         if (enter := self.screen.enter) is not None:
             self.screen.enter, self.mode = None, enter(self.mode)
         if self.screen.close_wanted or self.screen.closes:
             self._want_close()
-        self.screen.drop_old_messages()
         self._imgui.backend.io.delta_time = min(max(since_last_s, 1e-4), 1.0)
 
     def _show(self) -> None:
@@ -217,45 +186,14 @@ class Window:
         self._device.queue.submit([encoder.finish()])
 
     def _schedule(self) -> None:
-        """Request the next frame if something will change; otherwise sleep."""
         if self._frames is not None:
             self._frames -= 1
             if self._frames <= 0:
                 loop.call_soon(self.canvas.close)
-        # Dear ImGui handles quick key presses and clicks one by one, one per frame.
-        unread = len(self._imgui.imgui_context.input_events_queue) > 0
-        told = [message.text for message in self.screen.messages]
-        if unread or told != self._told:  # messages from the background also change sizes
-            self._extra_frames = SETTLE_FRAMES
-        else:
-            self._extra_frames = max(0, self._extra_frames - 1)
-        self._told = told
-        self._moving = self.mode.moving
-        woken, self._woken = self._woken, False  # Dear ImGui fits new text to its table one frame later
-        if self._moving or self._extra_frames or self._frames is not None or woken:
             self.canvas.request_draw()
-        messages = (message.until_s - self.screen.clock() for message in self.screen.messages)
-        due_s = least(self.mode.wait_s(), self.mode.drawing.wait_s(), *messages)
-        if due_s is not None:
-            self._wake_in(max(0.0, due_s))
+        super()._schedule()
 
-    def _wake(self) -> None:
-        """Draw a frame soon; runs in any thread, and sets flags that the canvas reads sixty times a second."""
-        self._woken = True
-        self.canvas.request_draw()
-
-    def _wake_in(self, seconds: float) -> None:
-        at_s = self.screen.clock() + seconds
-        if self._wake_at_s is not None and self._wake_at_s <= at_s:
-            return  # an earlier frame will check again
-        self._wake_at_s = at_s
-
-        def wake() -> None:
-            if self._wake_at_s == at_s:
-                self._wake_at_s = None
-                self.canvas.request_draw()
-
-        if seconds > 0:
-            loop.call_later(seconds, wake)
-        else:
-            wake()
+    @property
+    def _unread(self) -> bool:
+        """Dear ImGui handles quick key presses and clicks one by one, one per frame."""
+        return len(self._imgui.imgui_context.input_events_queue) > 0

@@ -17,6 +17,7 @@ from lambent.materials.models.model import Parameter
 from lambent.viewer.editor.editor import LOBES, Editor
 from lambent.viewer.editor.restrictions import DIFFUSE, lobe_names
 from lambent.viewer.editor.subject import REFERENCES
+from lambent.viewer.edits.in_words import LOBE, RETRO
 from lambent.viewer.panels import parameters
 from lambent.viewer.panels.widgets import (
     DIM,
@@ -149,7 +150,7 @@ def _numbers(editor: Editor, material: Material) -> tuple[Material, bool]:
         if parameter not in DIFFUSE:
             imgui.same_line(right - px(RANGE_PX))
             retro = lobe is not None and editor.subject.material.lobes[lobe].retro
-            _interval(editor, parameter, (parameters.RETRO if retro else parameters.LOBE)[attribute])
+            _interval(editor, parameter, (RETRO if retro else LOBE)[attribute])
 
     heading = partial(_heading, editor)
     return parameters.edited(renamed, editor.linked_roughness, line=line, all_terms=True, heading=heading)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -10,27 +9,14 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from lambent.baked.light_fields.map_cache import LEAST_RECENT
-from lambent.realtime.answering.texture_detail import without_uv
-from lambent.realtime.gpu.device import open_device
-from lambent.realtime.light.baked import read_baked
-from lambent.realtime.objects.replaced import with_replacements
-from lambent.realtime.renderer import Renderer
-from lambent.realtime.resources import device_needs
-from lambent.realtime.sun.turned_sky import under_turned_sky
-from lambent.scenes.replacement import parse_replacements
-from lambent.store.source import SOURCE
-from lambent.store.store import Store
 from lambent.viewer.background.fitting import Fitting
 from lambent.viewer.background.lost import rescued
 from lambent.viewer.background.work import POLL_S
 from lambent.viewer.cameras.navigation import Movement
-from lambent.viewer.cameras.picking import Geometry
-from lambent.viewer.mode import Drawing, Mode, Panel, SidePlots, Textures
+from lambent.viewer.mode import Drawing, Panel, SidePlots, Textures
 from lambent.viewer.modes.walk import dropping
 from lambent.viewer.modes.walk.comparison import error_scale
 from lambent.viewer.modes.walk.input import CARD, SHORTCUTS, WalkInput
-from lambent.viewer.modes.walk.light.answering import AnsweringLight
 from lambent.viewer.modes.walk.light.falling import FallingLight
 from lambent.viewer.modes.walk.panels import (
     compare,
@@ -47,11 +33,10 @@ from lambent.viewer.modes.walk.panels import (
     states,
     view,
 )
-from lambent.viewer.modes.walk.pictures import Pictures
 from lambent.viewer.modes.walk.session.finishes import Finishes
-from lambent.viewer.modes.walk.session.kept_view import restore
 from lambent.viewer.modes.walk.session.leaving import can_leave, edit_view
 from lambent.viewer.modes.walk.state import WalkState
+from lambent.viewer.modes.walk.walking import Walking, opened
 from lambent.viewer.panels import card, overlay, statistics
 from lambent.viewer.panels.curves import CurvesPanel
 from lambent.viewer.panels.plots import side_plots
@@ -60,56 +45,15 @@ from lambent.viewer.screen import Screen, least
 from lambent.viewer.sizes import SizedPanel
 
 
-def open_store(
-    path: Path, movement: Movement, screen: Screen, light_field_mb: float | None = None, policy: str = LEAST_RECENT,
-    sky_turn_deg: float = 0.0, replaced: tuple[str, ...] = (), fresh: bool = False,
-    device: Any = None,
-) -> WalkMode:  # fmt: skip
-    """Start the mode on a store with at least geometry and the scene record; else raise `UserError`.
-
-    `light_field_mb` is the GPU memory for light field maps, cached by a `policy` of `baked.light_fields.map_cache`;
-    `sky_turn_deg` rotates the sky; `replaced` are meshes in place of objects (`scenes.replacement`); `fresh` leaves the
-    store's session aside; the room is drawn on a `device`, by default its own.
-    """
-    store = Store.open(path)
-    baked = with_replacements(read_baked(store, light_field_mb, policy), parse_replacements(replaced))
-    baked = under_turned_sky(baked, sky_turn_deg)
-    state = WalkState.of(baked.record, movement, screen, store.folder)
-    state.marks.sources, state.fields.fields = baked.probes, baked.light_fields
-    state.lights.groups = baked.groups.records if baked.groups is not None else ()
-    state.lamps.records = () if baked.lamps is None else baked.lamps.records
-    state.lights.fields = bool(baked.light_fields)
-    state.sky_turn_deg, state.replaced = sky_turn_deg, replaced
-    from_scene = isinstance(store.documents.get(SOURCE), str) and not replaced
-    state.rebaking.possible = from_scene and sky_turn_deg % 360 == 0  # the light map keeps the sky as baked
-    of_session = state.session.open([group.name for group in state.lights.groups], fresh=fresh)
-    state.missing = (*baked.missing, *state.missing, *of_session, *restore(state))
-    state.texturing.textures, state.texturing.without_uv = baked.textures, without_uv(baked)
-    state.texturing.keeps = lambda: state.session.has_lock
-    state.notes, state.knows_noise = light_map_notes(store), baked.noise is not None
-    geometry = Geometry(baked.positions, baked.faces, state.selection.objects)
-    renderer = Renderer(device or open_device(device_needs(baked)), baked)
-    pictures = Pictures(renderer, state, AnsweringLight(store, renderer, state.answering))
-    falling = FallingLight(baked, store, lambda: pictures.light_groups)
-    return WalkMode(state, WalkInput(state, geometry), pictures, falling)
+def open_store(path: Path, movement: Movement, screen: Screen, *how: Any, **options: Any) -> WalkMode:
+    """Start the mode on a store; parameters and errors as of `walking.opened`."""
+    found = opened(path, movement, screen, *how, **options)
+    falling = FallingLight(found.baked, found.store, lambda: found.pictures.light_groups)
+    return WalkMode(found.state, found.input, found.pictures, falling)
 
 
-def light_map_notes(store: Store) -> tuple[str, ...]:
-    """Lines on noise and samples of the light map, per side, from the bake."""
-    notes = []
-    for name in ("light_map/irradiance", "light_map/irradiance_back"):
-        meta = store.artefact(name).meta if name in store else {}
-        noise, samples = meta.get("noise"), meta.get("samples")
-        if isinstance(noise, float) and isinstance(samples, float):
-            side = "far side" if name.endswith("back") else "light map"
-            notes.append(f"{side}: noise {100 * noise:.1f} % before denoising, {samples:.0f} samples per texel")
-    return tuple(notes)
-
-
-class WalkMode(Mode):
+class WalkMode(Walking):
     """See the module."""
-
-    input: WalkInput
 
     def __init__(
         self, state: WalkState, input: WalkInput, drawing: Drawing, falling: FallingLight | None = None
@@ -117,17 +61,13 @@ class WalkMode(Mode):
         self.finishes = Finishes(state.materials.edits, state.texturing, state.screen)
         self.fitting = Fitting(state.screen)
         of_column = panels(state, falling, self.finishes, self.fitting)
-        super().__init__(state.scene.name, state.screen, input, drawing, of_column)
-        self.state, self.falling = state, falling
+        super().__init__(state, input, drawing, of_column)
+        self.falling = falling
         self.head = partial(room.draw, state)
 
     @property
     def side_plots(self) -> SidePlots | None:
         return side_plots(self.state.materials.editor) if self.screen.size == "measure" else None
-
-    @property
-    def moving(self) -> bool:
-        return self.input.walking or self.state.navigation.playing
 
     def draw_over(self, textures: Textures) -> None:
         state, place = self.state, self.screen.picture
@@ -157,32 +97,18 @@ class WalkMode(Mode):
             state.materials.edits.end_stroke()
 
     def advance(self, dt_s: float) -> None:
-        self.input.walk(dt_s)
-        self.state.navigation.play(dt_s)
-        self.state.recordings.follow()
+        super().advance(dt_s)
         if self.state.materials.editor is not None:
             self.state.materials.editor.tick()
         self.fitting.poll()
-        self.state.session.tick()
 
     def wait_s(self) -> float | None:
-        editor = self.state.materials.editor
-        busy = self.state.recordings.recorder.on or (editor is not None and editor.busy)
-        busy = (
-            busy
-            or self.fitting.busy
-            or self.state.texturing.thumbnails.busy
-            or (self.falling is not None and self.falling.busy)
-        )
-        return least(POLL_S if busy else None, self.state.session.wait_s())
+        editor, falling = self.state.materials.editor, self.falling
+        busy = self.fitting.busy or (editor is not None and editor.busy) or (falling is not None and falling.busy)
+        return least(POLL_S if busy else None, super().wait_s())
 
     def drop(self, path: str) -> None:
         dropping.drop(path, self.state, self.input, self.finishes)
-
-    @property
-    def unsaved(self) -> tuple[str, ...]:
-        walk = ("the recorded walk",) if self.state.recordings.unsaved else ()
-        return (*self.state.session.unsaved, *walk)
 
     def save(self) -> None:
         if not self.state.session.keeps or not self.state.session.save():
@@ -204,10 +130,7 @@ class WalkMode(Mode):
     def close(self) -> None:
         self.fitting.close()
         self.state.materials.close_editor()
-        rescued("the recorded walk", self.state.recordings.rescue)
-        self.state.session.close()
-        if names := ", ".join(self.state.session.unsaved):
-            sys.stderr.write(f"lambent: note: changes not saved: {names}\n")
+        super().close()
 
 
 def panels(state: WalkState, falling: FallingLight | None, finishes: Finishes, fitting: Fitting) -> tuple[Panel, ...]:

@@ -160,8 +160,13 @@ class WalkState:
         return tuple(name for name in self.session.unsaved if name in self.scene.materials)
 
     @classmethod
-    def of(cls, scene: SceneRecord, movement: Movement, screen: Screen, store: Path | None = None) -> WalkState:
-        """State at the scene's first camera and exposure, with the views saved in the folder of the `store`."""
+    def of(
+        cls, scene: SceneRecord, movement: Movement, screen: Screen, store: Path | None = None, session: bool = True
+    ) -> WalkState:
+        """State at the scene's first camera and exposure, with the views saved in the folder of the `store`.
+
+        Without a `session`, edits are not kept.
+        """
         look, meter = Look(scene.exposure_ev or 0.0), Meter(expose_wanted=scene.exposure_ev is None)
         navigation, views = Navigation.of(scene, movement), SavedViews(scene, store, screen.say)
         fault, edits = views.load(), MaterialEdits(scene.materials)
@@ -169,7 +174,7 @@ class WalkState:
         return cls(
             scene, screen, look, navigation, Selection(whole_objects(scene.objects)),
             Materials(edits, screen), Recordings(views, navigation, screen, lights),
-            Marks({}, scene.reflectors), SessionKeeper(edits, store, screen), States(edits, scene),
+            Marks({}, scene.reflectors), SessionKeeper(edits, store if session else None, screen), States(edits, scene),
             Texturing(edits, screen, store),
             meter=meter, lights=lights, lamps=Lamps(edits, say=screen.say),
             store=store, store_name="STORE" if store is None else store.name,
