@@ -22,13 +22,14 @@ from lambent.baking.light.cache import LightMapCache
 from lambent.baking.pictures.gathering import MAX_DEPTH, Gathering
 from lambent.baking.running.tiles import slices
 from lambent.baking.tracing import path_tracer
-from lambent.baking.tracing.rays import block_sums, has_holes, intersect
+from lambent.baking.tracing.rays import block_sums, has_holes, intersect, rays_from
 from lambent.baking.tracing.scene_builder import SceneBuilder
 from lambent.baking.tracing.sobol import SobolSampler
 from lambent.baking.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats
 from lambent.core.light.light_mix import WHITE
 from lambent.core.plain import triple
+from lambent.core.progress import Progress
 from lambent.core.views.camera import Camera, image_plane
 from lambent.materials.document import Material
 from lambent.materials.factored.albedo import term_albedo
@@ -112,6 +113,16 @@ class Tracer:
             return [dr.select(dr.all(dr.isfinite(value)), value, 0.0)]
 
         return in_bands(sums, camera, size, first, count, seed)[0]
+
+    def specular_along(self, eye: Floats, directions: Floats, count: int, seed: int, progress: Progress) -> Floats:
+        """Mean radiance (k, 3) by lobes of the surfaces seen from `eye` (3,) along unit directions, the sky behind."""
+        found = np.empty((len(directions), 3))
+        for mine in slices(len(directions), max(1, RAYS_AT_ONCE // count)):
+            sampler = SobolSampler.of_pixels(seed, range(mine.start, mine.stop), 0, count)
+            rays = rays_from(eye, np.repeat(directions[mine], count, axis=0))
+            found[mine] = block_sums(self._traced(Kind.ended, Part.specular, rays, sampler), count) / count
+            progress(mine.stop, len(directions), "rays traced")
+        return found
 
     def _traced(self, kind: Kind, part: Part, ray: Any, sampler: Any) -> Any:
         start = path_tracer.camera_start(ray)

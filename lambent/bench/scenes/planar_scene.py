@@ -20,7 +20,7 @@ from lambent.realtime.frame_state import FrameState
 from lambent.realtime.light.baked import BakedScene
 from lambent.realtime.objects.unbaked import unbaked_scene
 from lambent.scenes.geometry import box, cylinder, patch, placed, sphere, turn
-from lambent.scenes.scene import Mesh, Scene, SceneObject
+from lambent.scenes.scene import ConstantEnvironment, Mesh, Scene, SceneObject
 from lambent.store.contract import ReflectorPart, ReflectorRecord
 
 FLOOR, PAINT, REACH = "floor", "paint", 4.0
@@ -92,26 +92,33 @@ def light_map_places(shapes: Mapping[str, Mesh]) -> dict[str, Floats]:
 def exact_reflection(
     lobe: Lobe, camera: Camera, width: int, height: int, spp: int, progress: Progress = silent
 ) -> tuple[Floats, Flags]:
-    """Radiance (height, width, 3) of the floor by ray casting, and the floor's pixels (height, width) bool.
+    """Radiance (height, width, 3) of the floor by paths, and the floor's pixels (height, width) bool.
 
-    `spp` samples of the lobe at every pixel's centre, as in the renderer's `qmc`, each traced to the triangle it hits.
+    `spp` paths start at every pixel's centre, as in the renderer's `qmc`, and end at the triangles that they hit.
     """
     from lambent.baking.engine import engine
 
     engine()
-    from lambent.baking.reference.planar_reflection import ReflectionTracer
+    from lambent.baking.pictures.tracer import LightMap, Tracer
+    from lambent.baking.surfaces.atlas import Atlas
+    from lambent.baking.tracing.rays import distances, rays_from
+    from lambent.baking.tracing.traced_scene import TracedScene
 
     shapes, dark = meshes(), (0.0, 0.0, 0.0)
-    objects = tuple(SceneObject(n, mesh, PAINT, LAMP if n == "lamp" else dark) for n, mesh in shapes.items())
-    scene = Scene("planar bench", objects, {PAINT: Material(name=PAINT, kd=(1, 1, 1))})
-    tracer = ReflectionTracer(scene, light_map_places(shapes), light_map(shapes), FLOOR, SKY)
-
+    objects = tuple(
+        SceneObject(name, mesh, FLOOR if name == FLOOR else PAINT, LAMP if name == "lamp" else dark)
+        for name, mesh in shapes.items()
+    )
+    materials = {PAINT: Material(name=PAINT, kd=(1, 1, 1)), FLOOR: Material(name=FLOOR, lobes=(lobe,))}
+    scene, irradiance = Scene("planar bench", objects, materials, ConstantEnvironment(SKY)), light_map(shapes)
+    atlas = Atlas(scene, light_map_places(shapes), irradiance.shape[1], irradiance.shape[0])
+    traced = TracedScene(atlas, {}, [False] * len(objects))
     rays = pixel_rays(camera, width, height).reshape(-1, 3)
     eye = np.asarray(camera.position, float)
     to_floor = -eye[1] / np.minimum(rays[:, 1], -1e-9)
     place = eye + rays * to_floor[:, None]
     shown = (rays[:, 1] < 0) & (np.abs(place[:, [0, 2]]).max(axis=1) < REACH)
-    shown &= tracer.distance(eye, rays) > to_floor - 1e-3
+    shown &= distances(traced.whole(diffuse=False), rays_from(eye, rays)) > to_floor - 1e-3
     light = np.zeros((len(rays), 3), np.float32)
-    light[shown] = tracer.reflected(lobe, place[shown], -rays[shown], spp, progress)
+    light[shown] = Tracer.of_baked(traced, LightMap(irradiance)).specular_along(eye, rays[shown], spp, 7, progress)
     return light.reshape(height, width, 3), shown.reshape(height, width)

@@ -7,12 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.baking.engine import engine
 from lambent.baking.reference.path_traced import render_reference
-from lambent.core.geometry.directions import normalize
 from lambent.core.views.camera import Camera
-from lambent.materials.bsdf import MaterialBSDF
-from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import Scene, SceneObject
 from tests.baking.small_scenes import BLACK, furnace
@@ -58,21 +54,3 @@ def test_same_seed_same_picture() -> None:
     b, _ = render_reference(furnace(), CAMERA, 8, 8, 4, seed=3)
     c, _ = render_reference(furnace(), CAMERA, 8, 8, 4, seed=4)
     assert np.array_equal(a, b) and not np.array_equal(a, c)
-
-
-def test_a_brushed_plane_under_an_even_sky_returns_its_albedo() -> None:
-    """By the tracer that planar reflectors are compared with: t is +x, and b is -z."""
-    engine()
-    from lambent.baking.reference.planar_reflection import ReflectionTracer
-
-    lobe = Lobe(mx=0.05, my=0.35, r0=0.6, alpha=0.3)
-    floor = SceneObject("floor", patch((-1, 0, 1), (2, 0, 0), (0, 0, -2)), "m")
-    pit = SceneObject("pit", patch((-1, -9, 1), (2, 0, 0), (0, 0, -2)), "m")  # which no ray meets
-    uv2 = {o.name: np.full((4, 2), 0.5) for o in (floor, pit)}
-    scene = Scene("s", (floor, pit), {"m": Material(lobes=(lobe,))})
-    tracer = ReflectionTracer(scene, uv2, np.zeros((4, 4, 3)), "floor", (1.0, 1.0, 1.0))
-    wo = normalize(np.array([[0.0, 1, 0], [0.8, 0.6, 0], [0, 0.6, -0.8], [0.5, 0.5, 0.5]]))
-    found = tracer.reflected(lobe, np.zeros((4, 3)), wo, 1 << 14)
-    local = np.stack([wo[:, 0], -wo[:, 2], wo[:, 1]], axis=-1)
-    expected = MaterialBSDF(Material(lobes=(lobe,))).albedo(local, samples=1 << 14)
-    np.testing.assert_allclose(found, expected, rtol=0.02)
