@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,23 +11,26 @@ import pytest
 from lambent.baking.bake import bake
 from lambent.baking.engine import engine
 from lambent.baking.quality import quality_named
-from lambent.bench.measuring.reprojection import reprojected
 from lambent.bench.pictures import flicker
+from lambent.bench.pictures.flicker import Distance, reprojected
 from lambent.core.views.camera import Camera, pixel_rays
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.geometry import merge, patch
 from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Mesh
+from lambent.store.contract import FAR
 
 BEFORE = Camera("before", (0.0, 0.0, 2.0), (0.0, 0.0, 0.0))
 AFTER = Camera("after", (0.13, 0.05, 1.9), (0.1, 0.0, 0.0))
 
 
-def surfaces(mesh: Mesh) -> Any:
+def surfaces(mesh: Mesh) -> Distance:
     engine()
-    from lambent.baking.reference.surfaces import Surfaces
+    from lambent.baking.tracing.rays import distances, rays_from
+    from lambent.baking.tracing.scene_builder import bare_scene
 
-    return Surfaces(mesh.positions, mesh.faces)
+    traced = bare_scene(mesh.corners)
+    return lambda origin, directions: np.minimum(distances(traced, rays_from(origin, directions)), FAR)
 
 
 def stripes(camera: Camera, width: int = 96, height: int = 64) -> np.ndarray:

@@ -10,39 +10,40 @@ antialiased frames (16 samples per pixel) and is the lower bound. Anything above
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from scipy.ndimage import map_coordinates
 
 from lambent.bench.measuring.reference import with_samples
-from lambent.bench.measuring.reprojection import reprojected
 from lambent.bench.scenes.views import first_camera, inputs_or_baked
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Flags, Floats
 from lambent.core.light.colour import shown
 from lambent.core.pictures import metrics
 from lambent.core.plain import triple
 from lambent.core.progress import Progress, silent
-from lambent.core.views.camera import Camera, camera_axes
+from lambent.core.views.camera import Camera, camera_axes, clip_from_world, pixel_rays
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
 from lambent.scenes.camera_paths import path_length, sample_path
-from lambent.store.contract import SceneRecord
+from lambent.store.contract import FAR, SceneRecord
 from lambent.store.source import scene_of
 from lambent.store.store import Store
 from lambent.traced.picture import TracedPicture
 from lambent.traced.room import room_of_store
 
-if TYPE_CHECKING:
-    from lambent.baking.reference.surfaces import Surfaces
-
 NAME = "flicker"
 CASES = 6
 STEP_M = 0.02  # half a metre a second at 25 frames
+NEAR_M = 1e-3
+HIDDEN = 2e-3  # relative distance by which a point may lie behind the surface that the other camera sees
+Distance = Callable[[Floats, Floats], Floats]
+"""Metres (n,) from a point (3,) along unit directions (n, 3), FAR without a hit."""
 
 
 @dataclass(frozen=True)
@@ -74,12 +75,13 @@ def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[d
     """One row per case; FLIP's mean is over all pairs of frames, the worst tile over all."""
     from lambent.baking.engine import engine
 
-    engine()
-    from lambent.baking.reference import surfaces as geometry  # imports Mitsuba, whose variant is set by `engine`
+    engine()  # before Mitsuba is imported
+    from lambent.baking.tracing.rays import distances, rays_from
+    from lambent.baking.tracing.scene_builder import bare_scene
 
     renderer = Renderer(open_device(), store)
     record, scene = renderer.scene.record, renderer.scene
-    surfaces = geometry.Surfaces(scene.positions, scene.faces)
+    surfaces = bare_scene(scene.positions[scene.faces])
     state = FrameState(first_camera(store, record), effort.width, effort.height)
     exposure_ev = record.exposure_ev
     if exposure_ev is None:
@@ -101,6 +103,9 @@ def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[d
     def smooth(camera: Camera) -> Floats:
         return _encoded(renderer.still(replace(state, camera=camera)))
 
+    def distance(origin: Floats, directions: Floats) -> Floats:
+        return np.minimum(distances(surfaces, rays_from(origin, directions)), FAR)
+
     tracer = room_of_store(store, scene_of(store)).tracer
 
     def traced(camera: Camera, *samples: int) -> list[Floats]:
@@ -114,13 +119,36 @@ def rows_of(store: Store, effort: Effort, progress: Progress = silent) -> list[d
     row("at rest", [metrics.flip_error(a, b) for a, b in pairwise(series)])
     films = ("walk", frame), ("walk, traced", lambda camera: traced(camera, effort.film)[0]), ("walk, smooth", smooth)
     for case, draw in films:
-        row(case, [_changed(draw(before), draw(after), before, after, surfaces) for before, after in steps])
+        row(case, [_changed(draw(before), draw(after), before, after, distance) for before, after in steps])
     return rows
 
 
-def _changed(earlier: Floats, later: Floats, before: Camera, after: Camera, surfaces: Surfaces) -> Floats:
-    moved, seen = reprojected(earlier, before, after, surfaces)
+def _changed(earlier: Floats, later: Floats, before: Camera, after: Camera, distance: Distance) -> Floats:
+    moved, seen = reprojected(earlier, before, after, distance)
     return metrics.flip_error(later, np.where(seen[..., None], moved, later))
+
+
+def reprojected(picture: Floats, before: Camera, after: Camera, distance: Distance) -> tuple[Floats, Flags]:
+    """A picture (H, W, 3) of camera `before` reprojected to `after`, and (H, W) whether both see the same surface.
+
+    Without flicker, it stays fixed on the surfaces.
+    """
+    height, width = picture.shape[:2]
+    rays = pixel_rays(after, width, height).reshape(-1, 3)
+    points = np.asarray(after.position) + rays * distance(np.asarray(after.position), rays)[:, None]
+    offset = points - np.asarray(before.position)
+    far = np.linalg.norm(offset, axis=1)
+    seen = distance(np.asarray(before.position), offset / far[:, None]) > far * (1 - HIDDEN)
+    clip = (
+        np.concatenate([points, np.ones((len(points), 1))], axis=1) @ clip_from_world(before, width, height, NEAR_M).T
+    )
+    w = np.where(clip[:, 3] > NEAR_M, clip[:, 3], np.inf)
+    column, row = (clip[:, 0] / w + 1) / 2 * width - 0.5, (1 - clip[:, 1] / w) / 2 * height - 0.5
+    seen &= np.isfinite(w) & (column >= 0) & (column <= width - 1) & (row >= 0) & (row <= height - 1)
+    channels = [
+        map_coordinates(channel, (row, column), order=1, mode="nearest") for channel in np.moveaxis(picture, -1, 0)
+    ]
+    return np.stack(channels, axis=-1).reshape(picture.shape), seen.reshape(height, width)
 
 
 def _steps(record: SceneRecord, places: int) -> Iterator[tuple[Camera, Camera]]:
