@@ -24,6 +24,7 @@ VENV = HOME / ".venv"
 PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 STAMP = VENV / "lambent-ready.json"
 PYTHONS = ((3, 11), (3, 12), (3, 13))  # those that every dependency has ready-made packages for
+BLENDER = "bpy==5.0.1"  # Blender as a package, for Python 3.11; tests that need it skip where it is not
 VALIDATOR = "gltf-validator@2.0.0-dev.3.10"  # of npm, without dependencies; tests that need it skip where it is not
 WINDOW_TEST_PACKAGES = {"Xvfb": "xvfb", "xdotool": "xdotool"}
 
@@ -92,6 +93,7 @@ def set_up(for_tests):
     install_package(for_tests)
     if for_tests:
         install_validator()
+        install_blender()
     install_system_parts(for_tests)
     STAMP.write_text(json.dumps({"wanted": wanted, "tests": for_tests}), encoding="utf-8")
 
@@ -99,7 +101,7 @@ def set_up(for_tests):
 def fingerprint():
     """Changes whenever the installation has to be done again: requirements, Python, or the place of this folder."""
     parts = [(HOME / name).read_bytes() for name in ("pyproject.toml", "constraints.txt")]
-    parts += [sys.version.encode(), str(HOME).encode(), VALIDATOR.encode()]
+    parts += [sys.version.encode(), str(HOME).encode(), VALIDATOR.encode(), BLENDER.encode()]
     return hashlib.sha256(b"\0".join(parts)).hexdigest()
 
 
@@ -145,6 +147,15 @@ def install_validator():
     options = ["--prefix", VENV / "node", "--no-save", "--no-package-lock", "--no-audit", "--no-fund", "--silent"]
     if subprocess.call([npm, "install", *options, VALIDATOR], stdout=subprocess.DEVNULL) != 0:
         say(f"npm could not install {VALIDATOR}; the tests that need it will skip")
+
+
+def install_blender():
+    """Without its requirements: it asks for numpy 1, and what the tests use of it runs with ours."""
+    if sys.version_info[:2] != (3, 11):
+        return
+    pip = [PYTHON, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--quiet", "--no-deps"]
+    if subprocess.call([*pip, BLENDER]) != 0:
+        say(f"pip could not install {BLENDER}; the tests that need it will skip")
 
 
 def install_system_parts(for_tests):

@@ -91,7 +91,8 @@ def test_shells_complete_commands_and_options(shell, words, expected):
 @pytest.mark.slow
 def test_the_wheel_works_outside_of_the_checkout(mi, tmp_path):
     pip, source = [sys.executable, "-m", "pip", "--disable-pip-version-check", "-q"], tmp_path / "source"
-    shutil.copytree(ROOT / "lambent", source / "lambent", ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in ("lambent", "integrations"):
+        shutil.copytree(ROOT / folder, source / folder, ignore=shutil.ignore_patterns("__pycache__"))
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, source)
     built = subprocess.run([*pip, "wheel", "--no-deps", "-w", tmp_path, source], capture_output=True, text=True)
@@ -102,7 +103,8 @@ def test_the_wheel_works_outside_of_the_checkout(mi, tmp_path):
     names = set(zipfile.ZipFile(wheel).namelist())
     package = ROOT / "lambent"
     data = {str(p.relative_to(ROOT)) for end in ("*.wgsl", "*.toml", "*.csv", "py.typed") for p in package.rglob(end)}
-    assert data <= names and not any(name.startswith(("tests/", "docs/")) for name in names)
+    extension = {f"lambent_blender/{p.name}" for p in (ROOT / "integrations/blender/lambent_blender").glob("*.*")}
+    assert data | extension <= names and not any(name.startswith(("tests/", "docs/")) for name in names)
     subprocess.run([*pip, "install", "--no-deps", "--target", tmp_path / "site", wheel], check=True)
     code = (
         "import lambent; s = lambent.read('builtin:box').bake('box.store', only={'light_map'}, progress=True);"

@@ -22,6 +22,7 @@ from lambent.core.errors import UserError
 from lambent.core.inputs import BUILTIN_PREFIX, foreign_bytes
 from lambent.materials.document import Material
 from lambent.scenes import builtin, loaders
+from lambent.scenes.loaders.blender import BLEND, exported
 from lambent.scenes.loaders.contents import Contents, LoadOptions
 from lambent.scenes.loaders.meshes.flush import with_flush_raised
 from lambent.scenes.loaders.meshes.repair import box_mapped, deviation_warnings, with_creases
@@ -41,8 +42,8 @@ def load_scene(path_or_builtin: str | Path, crease_deg: float | None = None) -> 
     Parameters
     ----------
     path_or_builtin : str or Path
-        "builtin:room", "builtin:box", or the path of a scene.toml, .glb, .gltf, .obj, .ply, .bpt or Mitsuba's .xml;
-        light and a camera are added to a file without them.
+        "builtin:room", "builtin:box", or the path of a scene.toml, .glb, .gltf, .obj, .ply, .bpt, Mitsuba's .xml or
+        Blender's .blend, which is exported beside it first; light and a camera are added to a file without them.
     crease_deg : float, optional
         0 to 180. Normals that are missing or lean far from their faces are recomputed: smooth where faces meet at less
         than this angle.
@@ -52,6 +53,10 @@ def load_scene(path_or_builtin: str | Path, crease_deg: float | None = None) -> 
     UserError
         If there is no such scene, or its file is unusable.
     """
+    if Path(path_or_builtin).suffix.lower() == BLEND:
+        file, lost = exported(Path(path_or_builtin))
+        scene = load_scene(file, crease_deg)
+        return replace(scene, warnings=(*lost, *scene.warnings))
     scene, text = _load(path_or_builtin, crease_deg), str(path_or_builtin)
     origin = text if text.startswith(BUILTIN_PREFIX) else os.path.abspath(text)
     scene = with_uv(with_luminous_surfaces(scene))
@@ -137,7 +142,9 @@ def _contents(path: Path, options: LoadOptions) -> Contents:
 def is_scene(path: Path, head: bytes) -> bool:
     """Whether a file that begins with `head` is a scene, by its ending and its first bytes."""
     modules = [m for m in formats() if path.suffix.lower() in m.ENDINGS]
-    return path.suffix.lower() == TOML or any(not hasattr(m, "recognise") or m.recognise(head) for m in modules)
+    return path.suffix.lower() in (TOML, BLEND) or any(
+        not hasattr(m, "recognise") or m.recognise(head) for m in modules
+    )
 
 
 def formats() -> list[ModuleType]:
@@ -150,7 +157,7 @@ def _format_of(path: Path) -> ModuleType:
     if module is None and not path.exists():
         raise UserError("cannot be read (no such file)", file=path)
     if module is None:
-        expected = ", ".join([*(ending for m in formats() for ending in m.ENDINGS), TOML])
+        expected = ", ".join([*(ending for m in formats() for ending in m.ENDINGS), TOML, BLEND])
         got = "a folder" if path.is_dir() else path.suffix or "no file extension"
         raise UserError("unknown scene format", file=path, got=got, expected=expected)
     return module

@@ -128,7 +128,8 @@ class DirectionalSection(_Coloured):
 class IesSection(_Coloured):
     """A luminaire of an IES or EULUMDAT file, straight down unless aimed; `lumens` scales it to that flux.
 
-    Its light leaves the `opening` that the file describes, or a point.
+    `scale` is a factor on its light, `across` the direction of horizontal angle 0, instead of `rotation_deg`. Its light
+    leaves the `opening` that the file describes, or a point.
     """
 
     kind: Literal["ies"]
@@ -137,10 +138,13 @@ class IesSection(_Coloured):
     position: Vector
     direction: Vector = (0.0, -1.0, 0.0)
     rotation_deg: Finite = 0.0
+    across: Vector | None = None
     lumens: NotNegative | None = None
+    scale: NotNegative = 1.0
     opening: Literal["point", "file"] = "file"
 
     _direction = field_validator("direction")(not_zero)
+    _across = field_validator("across")(lambda across: across if across is None else not_zero(across))
 
     def light_of(self, luminaire: Luminaire) -> IesLight:
         photometry = luminaire.photometry(self.lamp_set) if self.lumens is None else luminaire.values
@@ -151,7 +155,9 @@ class IesSection(_Coloured):
         scale = photometry.tilted(tilt_deg)
         if self.lumens is not None:
             scale = self.lumens / max(photometry.lumens, 1e-9)
-        return IesLight(self.position, photometry, coloured(scale, self.colour), aim, self.rotation_deg, name=self.name)
+        power = coloured(scale * self.scale, self.colour)
+        light = IesLight(self.position, photometry, power, aim, self.rotation_deg, name=self.name)
+        return light if self.across is None else light.turned_to(np.array(unit(self.across)))
 
 
 LightSection = PointSection | SpotSection | DirectionalSection | IesSection

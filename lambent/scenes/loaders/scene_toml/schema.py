@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, field_validator, model_validator
@@ -197,12 +198,26 @@ class CameraSection(ViewSection):
 
 
 class PathSection(Section):
+    """Keys passed at constant speed, or at `times_s`, which start at 0 and end at `seconds`."""
+
     name: str
     seconds: Positive = 20.0
+    times_s: tuple[NotNegative, ...] | None = None
     keys: Annotated[tuple[ViewSection, ...], Field(min_length=2)]
 
+    @model_validator(mode="after")
+    def _timed(self) -> PathSection:
+        times = self.times_s
+        if times is None:
+            return self
+        ends = times[:1] == (0,) and times[-1:] == (self.seconds,)
+        if len(times) != len(self.keys) or not ends or any(b <= a for a, b in pairwise(times)):
+            raise ValueError("times_s has an increasing time for each key, from 0 to seconds")
+        return self
+
     def path(self) -> CameraPath:
-        return CameraPath(self.name, tuple(k.camera(f"{self.name}_{i}") for i, k in enumerate(self.keys)), self.seconds)
+        keys = tuple(k.camera(f"{self.name}_{i}") for i, k in enumerate(self.keys))
+        return CameraPath(self.name, keys, self.seconds, self.times_s)
 
 
 class ReflectorSection(Section):

@@ -1,0 +1,1 @@
+"""Lambent's extension of Blender: see README.md beside it."""

@@ -1,0 +1,47 @@
+"""Files that a .blend refers to or holds, copied beside the exported scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+
+
+@dataclass
+class Copies:
+    """Copies below `folder`; what is missing goes to `note`."""
+
+    folder: Path
+    note: object
+    _taken: dict = field(default_factory=dict)  # source -> name below the folder
+
+    def take(self, file, owner, into, what, otherwise="left out"):
+        """Name below the folder of a copy of a file, a path or a text; None, with a note, if it is missing."""
+        if not isinstance(file, str):
+            return self.write(file.name, file.as_string().encode(), into, file)
+        if file.startswith("//") and not (bpy.data.filepath or owner.library):
+            self.note(f"{what}: {file} is relative to a .blend that is not saved: {otherwise}")
+            return None
+        path = Path(bpy.path.abspath(file, library=owner.library))
+        try:
+            return self.write(path.name, path.read_bytes(), into, path.resolve())
+        except OSError as error:
+            self.note(f"{what}: {path} cannot be read ({error.strerror}): {otherwise}")
+            return None
+
+    def write(self, name, content, into, source):
+        """Name below the folder of a file with this content; the same source is written once."""
+        if source not in self._taken:
+            target = self.folder / into / self._free(into, name)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(content)
+            self._taken[source] = target.relative_to(self.folder).as_posix()
+        return self._taken[source]
+
+    def _free(self, into, name):
+        taken, stem, number = {one.casefold() for one in self._taken.values()}, Path(name), 1
+        while f"{into}/{name}".casefold() in taken:
+            number += 1
+            name = f"{stem.stem}_{number}{stem.suffix}"
+        return name
