@@ -42,7 +42,7 @@ def python_page() -> str:
     import lambent
 
     parts = [f"# Python\n\n{import_module('lambent.api').__doc__}"]
-    functions = ("read", "bake", "open", "compare")
+    functions = [one for one in lambent.__all__ if one[0].islower()]
     for name in (*functions, *(one for one in lambent.__all__ if one[0].isupper())):
         parts.append(f"::: {getattr(lambent, name).__module__}.{name}")
     return "\n\n".join(parts) + "\n"

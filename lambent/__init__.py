@@ -14,6 +14,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from lambent.api.checking import check as check
+    from lambent.api.converting import convert as convert
+    from lambent.api.glare import glare as glare
     from lambent.api.materials import Material as Material
     from lambent.api.pictures import Comparison as Comparison
     from lambent.api.pictures import Picture as Picture
@@ -31,7 +34,8 @@ __version__ = "0.1.0"
 _MODULES = {
     "Comparison": "api.pictures", "Fit": "api.tables", "Material": "api.materials", "Picture": "api.pictures",
     "Scene": "api.scenes", "Store": "api.stores", "Table": "api.tables", "UserError": "core.errors",
-    "bake": "api.scenes", "compare": "api.pictures", "open": "api.reading", "read": "api.reading",
+    "bake": "api.scenes", "check": "api.checking", "compare": "api.pictures", "convert": "api.converting",
+    "glare": "api.glare", "open": "api.reading", "read": "api.reading",
 }  # fmt: skip
 __all__ = ["__version__", *_MODULES]
 

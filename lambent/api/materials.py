@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from lambent.api.progress import Wanted, progress_of
 from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
@@ -52,6 +53,13 @@ class Material:
     def albedo(self, wo: Floats, samples: int = 4096) -> Floats:
         """Directional albedo (..., 3) of wo (..., 3): the integral of f |cos| over all wi, by importance sampling."""
         return self._bsdf.albedo(np.asarray(wo, float), samples)
+
+    def normalised(self, seed: int = 0, progress: Wanted = None) -> Material:
+        """An energy-conserving version, with lower alpha, then lower k; itself where no albedo exceeds 1."""
+        from lambent.materials.checking.normalise import normalisation
+
+        with progress_of(progress) as bar:
+            return Material(normalisation(self.document, seed, bar).after)
 
     def save(self, file: str | Path) -> None:
         """Write the document (.json)."""

@@ -8,10 +8,8 @@ from typing import Annotated
 
 import typer
 
-from lambent.cli.console import Force, Json, note, progress_bar, show, table
+from lambent.cli.console import Force, Json, note, show, table
 from lambent.core.errors import UserError
-
-SIDE_PX = 800
 
 
 def command(
@@ -31,31 +29,18 @@ def command(
 
     Example: lambent glare room.store --camera entrance -o glare.png
     """
-    from lambent.core.light.glare import glare
-    from lambent.core.light.radiance_views import read_view
+    from lambent.api.glare import glare
     from lambent.core.outputs import check_output
-    from lambent.core.pictures.images import read_image, write_shown
-    from lambent.core.views.projections import Projection
+    from lambent.core.pictures.images import write_shown
 
     if output is not None:
         check_output(output, (".png",), force=force, inputs=[what])
-    if what.is_dir():
-        from lambent.render import Settings
-        from lambent.render.output import drawn_view
-
-        settings = Settings(SIDE_PX, SIDE_PX, integrator, projection=Projection.fisheye)
-        with progress_bar() as progress:
-            radiance, seen = drawn_view(what, camera, settings, note=note, progress=progress)
-        view = settings.view_of(seen)
-    elif camera is not None:
+    if not what.is_dir() and camera is not None:
         raise UserError("applies to stores only", field="--camera", got=camera, hint="a picture has its own view")
-    else:
-        view, radiance = read_view(what), read_image(what)
-    found = glare(radiance, view, threshold)
+    settings = {"integrator": integrator} if what.is_dir() else {}
+    found = glare(what, camera, threshold_cd_m2=threshold, note=note, progress=True, **settings)
     if output is not None:
-        from lambent.core.light.glare_picture import marked
-
-        write_shown(output, marked(radiance, found))
+        write_shown(output, found.marked())
     facts = {key: getattr(found, key) for key in ("dgp", "ugr", "comfort", "illuminance_lx", "background")}
     facts |= {"sources": [asdict(source) for source in found.sources], "written": output}
     lines = [

@@ -21,7 +21,10 @@ HEAVY = ("numpy", "scipy", "mitsuba", "drjit", "wgpu", "imgui_bundle", "matplotl
 # Changing a line here changes what users' scripts rely on: see CONTRIBUTING.md, "Public names".
 SIGNATURES = """
 bake(scene, folder, *, quality, progress, **options)
+check(subject, *, seed, reconstruction, progress, **values)
 compare(reference, test)
+convert(subject, file, *, as_, reconstruction, progress)
+glare(what, camera, *, threshold_cd_m2, note, progress, **settings)
 open(folder)
 read(file, *, reconstruction, crease_deg)
 Comparison.flip
@@ -36,6 +39,7 @@ Material.albedo(self, wo, samples)
 Material.eval(self, wi, wo)
 Material.facts(self)
 Material.name
+Material.normalised(self, seed, progress)
 Material.pdf(self, wi, wo)
 Material.plot(self, file, title)
 Material.read(file)

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from lambent.cli.console import Between, Force, Json, metric_errors, progress_bar, show, table, words
-from lambent.core.errors import UserError, did_you_mean
+from lambent.core.errors import UserError
 
 if TYPE_CHECKING:
     from lambent.materials.checking.check import CheckReport
     from lambent.materials.checking.check_table import TableReport
     from lambent.materials.checking.normalise import Normalisation
-    from lambent.materials.document import Material
-    from lambent.materials.measured.protocol import MeasuredTable
-    from lambent.materials.models.model import Model
 
 
 def command(
@@ -48,21 +45,13 @@ def command(
 
     Example: lambent check ward --set mx=0.05 --set my=0.3
     """
-    from lambent.materials.checking.check import check
-    from lambent.materials.checking.check_table import check_table
-    from lambent.materials.document import Material
-    from lambent.materials.models.model import Model
+    from lambent.api.checking import check
 
     if normalise or output is not None:
         _normalise(subject, values or [], normalise, output, seed, force, json)
         return
-    found = _subject(subject, values or [], reconstruction)
-    with progress_bar() as progress:
-        report: CheckReport | TableReport
-        if isinstance(found, Material | Model):
-            report = check(found, seed=seed, progress=progress)
-        else:
-            report = check_table(found, seed=seed, progress=progress)
+    given = dict(_value(text) for text in values or [])
+    report = check(subject, seed=seed, reconstruction=reconstruction, progress=True, **given)
     show(report.to_json(), describe(report), json)
     if not report.passed:
         raise typer.Exit(1)
@@ -72,46 +61,30 @@ def _normalise(
     subject: str, values: list[str], asked: bool, output: Path | None, seed: int, force: bool, json: bool
 ) -> None:
     """Write the energy-conserving version of a material document, if it needs one."""
+    from lambent.api.materials import Material
+    from lambent.api.reading import read
     from lambent.core.outputs import check_output
     from lambent.materials.checking.normalise import normalisation
-    from lambent.materials.document import Material
-    from lambent.materials.models.model import Model
 
     if not asked or output is None:
         lacking = "-o" if output is None else "--normalise"
         raise UserError("is missing", field=lacking, hint="use both: --normalise -o OUT.json")
+    if values:
+        raise UserError("only a model takes parameters", file=subject, field="--set", got=values[0])
     check_output(output, (".json",), force=force, inputs=[subject])
-    found = _subject(subject, values)
-    if isinstance(found, Model):
-        raise UserError("is a model; only a material document can be normalised", got=subject)
+    found = read(subject)
     if not isinstance(found, Material):
-        hint = f"fit it first: lambent fit {subject} -o material.json"
-        raise UserError("is a measured table; only a material document can be normalised", file=subject, hint=hint)
+        what, hint = found.facts()["is"], f"fit it first: lambent fit {subject} -o material.json"
+        raise UserError(f"is a {what}; only a material document can be normalised", file=subject, hint=hint)
     with progress_bar() as progress:
-        done = normalisation(found, seed, progress)
+        done = normalisation(found.document, seed, progress)
     if done.needed:
         done.after.save(output)
     facts = done.to_json() | {"written": output if done.needed else None}
     show(facts, describe_normalisation(done, output), json)
 
 
-def _subject(name: str, values: list[str], reconstruction: Between = "auto") -> Material | MeasuredTable | Model:
-    """The material or table of a file, or the model of this name; a file takes precedence."""
-    from lambent.cli.materials.convert import subject_of
-    from lambent.materials.models import models
-
-    if Path(name).exists():
-        if values:
-            raise UserError("only a model takes parameters", file=name, field="--set", got=values[0])
-        return subject_of(Path(name), reconstruction)
-    found = models()
-    if name not in found:
-        expected = f"a file, or a model: {', '.join(found)}"
-        raise UserError("is neither a file nor a model", got=name, expected=expected, hint=did_you_mean(name, found))
-    return found[name](**dict(_value(text) for text in values))
-
-
-def _value(text: str) -> tuple[str, object]:
+def _value(text: str) -> tuple[str, Any]:
     """Parse "ks=.1,.2,.3" to ("ks", [.1, .2, .3])."""
     name, equals, numbers = text.partition("=")
     try:

@@ -14,6 +14,7 @@ Angles refer to the view direction of a person who looks at the picture's centre
 
 from __future__ import annotations
 
+import colorsys
 import math
 from dataclasses import dataclass
 
@@ -22,7 +23,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from lambent.core.arrays import Flags, Floats
 from lambent.core.errors import UserError
+from lambent.core.light.colour import luminance, shown
 from lambent.core.light.photometry import photometric
+from lambent.core.pictures.images import to_bytes
 from lambent.core.views.camera import camera_axes
 from lambent.core.views.projections import View
 
@@ -31,6 +34,7 @@ GAP_RAD = 0.1
 MOST_INDEX = 16.0
 LEAST_LX = 380.0  # below, DGP underestimates people's ratings
 COMFORT = ((0.35, "imperceptible"), (0.40, "perceptible"), (0.45, "disturbing"))  # of DGP; above, intolerable
+MARK_SHARE = 0.6  # opacity of the mark over a source
 COVERED_SR = 2 * math.pi * 0.97  # solid angle of a view that counts as the half space ahead
 
 
@@ -48,7 +52,7 @@ class Source:
     elevation_deg: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Glare:
     """Glare at an eye.
 
@@ -66,6 +70,8 @@ class Glare:
         In descending order of brightness at the eye.
     numbers : ndarray
         (H, W) number of each pixel's source, from 1; 0 outside sources.
+    radiance : ndarray
+        (H, W, 3), W/(sr m2): the picture.
     """
 
     dgp: float
@@ -74,6 +80,7 @@ class Glare:
     background: float
     sources: tuple[Source, ...]
     numbers: NDArray[np.int32]
+    radiance: Floats
 
     @property
     def comfort(self) -> str:
@@ -81,6 +88,16 @@ class Glare:
         if self.illuminance_lx < LEAST_LX and not self.sources:
             return f"too dark for DGP (below {LEAST_LX:g} lx)"
         return next((word for limit, word in COMFORT if self.dgp < limit), "intolerable")
+
+    def marked(self) -> NDArray[np.uint8]:
+        """(H, W, 3) display values: the background at a fitting exposure, each source in its own hue."""
+        lit = luminance(self.radiance)[(self.numbers == 0) & (self.radiance.max(axis=-1) > 0)]
+        exposure_ev = float(np.log2(0.18 / np.exp(np.log(lit).mean()))) if len(lit) and lit.min() > 0 else 0.0
+        picture = np.asarray(shown(self.radiance, "filmic", exposure_ev), float)
+        hues = [colorsys.hsv_to_rgb((0.618034 * k) % 1, 0.9, 1.0) for k in range(len(self.sources))]
+        colours = np.array([(0.0, 0.0, 0.0), *hues])[self.numbers]
+        share = MARK_SHARE * (self.numbers > 0)[..., None]
+        return to_bytes(picture * (1 - share) + colours * share)
 
 
 def glare(radiance: Floats, view: View, threshold: float = THRESHOLD_CD_M2) -> Glare:
@@ -99,16 +116,16 @@ def glare(radiance: Floats, view: View, threshold: float = THRESHOLD_CD_M2) -> G
             "picture shows too little of the surroundings for glare", got=f"{covered:.2f} sr",
             expected="the half space ahead, 6.28 sr", hint="render it with --projection fisheye",
         )  # fmt: skip
-    shown = np.where(seen, photometric(radiance), 0.0)
-    numbers = _numbered(shown, rays, threshold)
-    flux = shown * solid_angle * np.maximum(ahead, 0)
+    visible = np.where(seen, photometric(radiance), 0.0)
+    numbers = _numbered(visible, rays, threshold)
+    flux = visible * solid_angle * np.maximum(ahead, 0)
     illuminance = float(flux.sum())
     background = max(illuminance - float(flux[numbers > 0].sum()), 0.0) / math.pi
     sources, weights = [], []
     for number in range(1, int(numbers.max()) + 1):
         of = numbers == number
         omega = float(solid_angle[of].sum())
-        mean = [np.average(v[of], weights=solid_angle[of]) for v in (shown, right, up, ahead)]
+        mean = [np.average(v[of], weights=solid_angle[of]) for v in (visible, right, up, ahead)]
         index = float(position_index(*mean[1:]))
         azimuth, elevation = np.arctan2(mean[1], mean[3]), np.arctan2(mean[2], np.hypot(mean[1], mean[3]))
         sources.append(Source(float(mean[0]), omega, index, *np.degrees([azimuth, elevation]).tolist()))
@@ -120,7 +137,7 @@ def glare(radiance: Floats, view: View, threshold: float = THRESHOLD_CD_M2) -> G
     renamed = np.zeros(len(sources) + 1, np.int32)
     renamed[order + 1] = np.arange(1, len(sources) + 1)
     ranked = tuple(sources[k] for k in order)
-    return Glare(min(dgp, 1.0), ugr, illuminance, background, ranked, renamed[numbers])
+    return Glare(min(dgp, 1.0), ugr, illuminance, background, ranked, renamed[numbers], radiance)
 
 
 def position_index(right: ArrayLike, up: ArrayLike, ahead: ArrayLike) -> Floats:

@@ -1,0 +1,53 @@
+"""`lambent.check`, `convert` and `glare` do what the commands do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import lambent
+from lambent.core.geometry.directions import direction
+from lambent.core.light.photometry import photometric
+from lambent.materials.document import Lobe
+from lambent.materials.document import Material as Document
+
+BRIGHT = Document(name="bright", kd=0.9, lobes=(Lobe(mx=0.1, my=0.1, r0=0.9),))
+
+
+def test_materials_files_and_models_are_checked(tmp_path):
+    found = lambent.check(lambent.Material(BRIGHT))
+    assert not found.passed and "grow without bound" in found.failures[0]
+    safe = lambent.Material(BRIGHT).normalised()
+    assert lambent.check(safe).passed and safe.normalised() == safe
+    safe.save(tmp_path / "safe.json")
+    assert lambent.check(tmp_path / "safe.json").to_json() == lambent.check(safe).to_json()
+    assert lambent.check("ward", mx=0.1, ks=(0.2, 0.4, 0.9)).passed
+    for wrong, values, message in (
+        ("wadr", {}, "did you mean.*ward"),
+        (safe, {"mx": 0.1}, "only a model takes"),
+        ("builtin:box", {}, "is neither a file nor a model"),
+    ):
+        with pytest.raises(lambent.UserError, match=message):
+            lambent.check(wrong, **values)
+
+
+def test_a_material_is_written_in_another_format(tmp_path):
+    paper = lambent.Material(Document(name="paper", kd=0.5))
+    cost = lambent.convert(paper, tmp_path / "paper.bsdf", as_="rgl")
+    assert cost.verdict.word == "faithful" and cost.errors
+    table = lambent.read(tmp_path / "paper.bsdf")
+    assert table.eval(direction(0.3, 0.0), direction(0.5, 1.0)) == pytest.approx(0.5 / np.pi, rel=1e-3)
+    with pytest.raises(lambent.UserError, match="fit it first"):
+        lambent.convert(table, tmp_path / "paper.mtlx")
+    with pytest.raises(lambent.UserError, match="found a folder; expected a material or a measured table"):
+        lambent.convert(tmp_path, tmp_path / "any.bsdf", as_="rgl")
+
+
+def test_glare_of_a_view_in_a_store(adapter, baked_box):
+    found = lambent.glare(baked_box, "front", integrator="lamps", threshold_cd_m2=100)
+    marked = found.marked()
+    assert marked.shape == found.radiance.shape and found.sources
+    brightest = photometric(found.radiance)[found.numbers == 1].mean()
+    assert brightest == pytest.approx(found.sources[0].luminance, rel=0.1)
+    with pytest.raises(lambent.UserError, match="applies to stores only"):
+        lambent.glare(baked_box / "manifest.json", "front")
