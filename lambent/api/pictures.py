@@ -149,6 +149,15 @@ def png_of(picture: NDArray[np.uint8]) -> bytes:
     return made.getvalue()
 
 
+def jpeg_of(picture: NDArray[np.uint8]) -> bytes:
+    """An image (H, W, 3 or 4), opaque, as the bytes of a JPEG file."""
+    from PIL import Image
+
+    made = io.BytesIO()
+    Image.fromarray(picture[..., :3]).save(made, "jpeg", quality=90)
+    return made.getvalue()
+
+
 def png_of_plot(plot: Callable[[Path], None]) -> bytes:
     """What `plot` draws into a file, as the bytes of a PNG file."""
     with tempfile.TemporaryDirectory() as folder:

@@ -14,7 +14,7 @@ from lambent.api.progress import Wanted, progress_of
 from lambent.core.discovery import known
 from lambent.core.errors import UserError, invalid
 from lambent.core.extras import needing_extras
-from lambent.core.light.light_mix import MixTrack, parse_light
+from lambent.core.light.light_mix import LightMix, MixTrack, parse_light
 from lambent.core.views.camera import Camera
 from lambent.scenes.looks.variants import variant_named
 from lambent.scenes.scene import Look, Variant
@@ -25,6 +25,7 @@ from lambent.store.light_groups import light_groups
 from lambent.store.store import Store as Arrays
 
 if TYPE_CHECKING:
+    from lambent.api.views import View
     from lambent.render import Images, Rendered, Settings
     from lambent.render.illuminance import Illuminated
 
@@ -217,6 +218,50 @@ class Store:
                 self.arrays, settings, wanted, state or "as baked", error, maintenance, lambda text: None, bar
             )
 
+    def view(
+        self,
+        camera: str | Camera | None = None,
+        *,
+        size: tuple[int, int] = (960, 540),
+        light: Light | None = None,
+        edits: Mapping[str, Material] | None = None,
+        variant: str = "",
+        exposure_ev: float | None = None,
+    ) -> View:
+        """Open a live view in the cell of a notebook, as the last line of the cell: walk, look, change.
+
+        The mouse and the keys do what they do in the window of `lambent walk`, controls below the picture change
+        variant, camera, exposure, light and the material of a clicked object; a picture at rest is traced. Nothing is
+        written into the store, unless V saves a view. Close a view that is not needed any more: it holds a graphics
+        device and, at rest, a process that traces.
+
+        Parameters
+        ----------
+        camera, light, edits, variant, exposure_ev
+            How it begins; as of `render`.
+        size : (width, height)
+            Of the picture in the browser's pixels.
+
+        Raises
+        ------
+        UserError
+            If this is no notebook, a package of `lambent[notebook]` or a graphics adapter is missing, the store cannot
+            be drawn, or a name or value is unknown.
+        """
+        from lambent.api.views import View
+        from lambent.render.output import opened_with_views, view_of
+
+        known("variant", variant, ("", *self.variants), field="variant")
+        self._check(edits or {})
+        track, where = self._mix(light), None if camera is None else view_of(opened_with_views(self.arrays)[1], camera)
+        with needing_extras():
+            from lambent.viewer.canvas.cell import open_cell
+
+            cell = open_cell(self.folder, size)
+        mix = None if track is None else LightMix({name: keys[0][1] for name, keys in track.groups.items()})
+        cell.begin(where, variant, mix, {name: one.document for name, one in (edits or {}).items()}, exposure_ev)
+        return View(cell)
+
     def facts(self) -> dict[str, Any]:
         """Arrays, complete or not, whether every chunk on disk is sound, and what the scene offers, by name."""
         store, has_scene, groups = self.arrays, SCENE in self.arrays.documents, light_groups(self.arrays)
@@ -235,26 +280,31 @@ class Store:
     def _settings(self, size: tuple[int, int], light: Light | None, variant: str, **settings: Any) -> Settings:
         from lambent.render import Settings
 
-        mix = None
-        if isinstance(light, str):
-            mix = MixTrack.of(variant_named(variants_of(self.arrays), light).light)
-        elif light is not None:
-            for name in light:
-                known("light group", name, self.light_groups, field="light")
-            mix = parse_light(f"{name}={value}" for name, value in light.items())
         try:
-            return Settings(*size, light=mix, variant=variant, **settings)
+            return Settings(*size, light=self._mix(light), variant=variant, **settings)
         except TypeError as error:  # a field that there is not
             raise UserError(str(error).partition(") ")[2], field="render") from error
+
+    def _mix(self, light: Light | None) -> MixTrack | None:
+        if light is None:
+            return None
+        if isinstance(light, str):
+            return MixTrack.of(variant_named(variants_of(self.arrays), light).light)
+        for name in light:
+            known("light group", name, self.light_groups, field="light")
+        return parse_light(f"{name}={value}" for name, value in light.items())
+
+    def _check(self, edits: Mapping[str, Material]) -> None:
+        for name in edits:
+            known("material", name, scene_record(self.arrays).materials, field="edits")
 
     def _images(self, settings: Settings, edits: Mapping[str, Material], note: Note | None) -> Images:
         from lambent.render import images
 
         drawn = images(self.arrays, settings, note=note or (lambda text: None))
         if edits:
+            self._check(edits)
             record, names = scene_record(self.arrays), variants_of(self.arrays)
-            for name in edits:
-                known("material", name, record.materials, field="edits")
             own = {name: name if name in record.textures else "" for name in edits}
             before = variant_named(names, settings.variant) if settings.variant else Variant("edits")
             looks = {name: Look(one.document, own[name]) for name, one in edits.items()}
@@ -269,10 +319,6 @@ class Store:
             f"Store({str(self.folder)!r}, {record.name!r}, {len(record.objects)} objects, "
             f"{len(self.cameras)} cameras, {len(self.variants)} variants)"
         )
-
-
-def _array_in_words(store: Arrays, artefact: Any) -> str:
-    return f"{'x'.join(map(str, artefact.shape))} {artefact.dtype}, {_health(store, artefact)}"
 
 
 def _health(store: Arrays, artefact: Any) -> str:

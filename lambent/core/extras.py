@@ -10,6 +10,7 @@ from lambent.core.errors import UserError
 EXTRAS = {
     "drjit": "bake", "mitsuba": "bake", "pyoidn": "bake", "xatlas": "bake", "distributed": "cluster",
     "glfw": "walk", "imageio_ffmpeg": "walk", "imgui_bundle": "walk", "rendercanvas": "walk", "wgpu": "walk",
+    "ipywidgets": "notebook", "jupyter_rfb": "notebook",
 }  # fmt: skip
 
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
-import wgpu
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
@@ -17,7 +16,7 @@ from lambent.core.light.false_colour import with_scale
 from lambent.core.pictures.images import write_image, write_shown
 from lambent.realtime.frame_state import FrameState, quantity_of
 from lambent.realtime.gpu.device import adapter_info
-from lambent.realtime.gpu.targets import DISPLAY_FORMAT
+from lambent.realtime.gpu.targets import DISPLAY_FORMAT, target_texture
 from lambent.realtime.planar.planar_integrators import OFF
 from lambent.realtime.renderer import Renderer
 from lambent.viewer.edits.edits import unused
@@ -137,9 +136,7 @@ class Picture:
             self._size, self._spare = (width, height), []
         free = [view for view in self._spare if view is not self.view]
         if not free:
-            usage = wgpu.TextureUsage.RENDER_ATTACHMENT | wgpu.TextureUsage.TEXTURE_BINDING
-            texture = self._device.create_texture(size=(width, height, 1), format=DISPLAY_FORMAT, usage=usage)
-            free = [texture.create_view()]
+            free = [target_texture(self._device, (width, height, 1), DISPLAY_FORMAT).create_view()]
             self._spare += free
         return free[0]
 

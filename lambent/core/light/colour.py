@@ -99,6 +99,11 @@ def srgb_decode(encoded: Floats) -> Floats:
     return np.where(encoded <= 0.04045, encoded / 12.92, curve).astype(encoded.dtype)
 
 
+def hex_of(linear: Floats) -> str:
+    """The sRGB colour #rrggbb of a linear one (3,), clipped to 0 and 1."""
+    return "#" + np.round(255 * np.clip(srgb_encode(np.asarray(linear)), 0, 1)).astype(np.uint8).tobytes().hex()
+
+
 def filmic(linear: Floats, exposure_ev: float = 0.0) -> Floats:
     """Scene radiance to display-linear [0, 1] by a filmic curve: toe, straight part, shoulder.
 

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from lambent.core.errors import UserError, did_you_mean
-from lambent.core.light.colour import XYZ_TO_RGB, luminance, srgb_decode
+from lambent.core.light.colour import XYZ_TO_RGB, hex_of, luminance, srgb_decode
 from lambent.core.plain import Triple, triple
 
 WHITE: Triple = (1.0, 1.0, 1.0)
@@ -204,6 +204,16 @@ def mix_of(value: str, text: str) -> GroupMix:
             raise
         ranges = f"intensities reach {MOST_INTENSITY:g}; a temperature ends in K, {LEAST_K:g}K to {MOST_K:g}K"
         raise UserError(error.message, field="--light", got=text, hint=ranges) from error
+
+
+def in_words(mix: GroupMix) -> str:
+    """The value that `mix_of` reads as this mix; a colour keeps 8 bits."""
+    words = [f"{mix.intensity:g}"] if mix.on else [f"{mix.intensity:g}", "off"]
+    if mix.temperature_k is not None:
+        words.append(f"{mix.temperature_k:g}K")
+    if mix.colour != WHITE:
+        words.append(hex_of(np.array(mix.colour) / max(mix.colour)))
+    return ",".join(words)
 
 
 def _mix_of(value: str, text: str) -> GroupMix:

@@ -19,13 +19,18 @@ def target_texture(device: Any, size: tuple[int, ...], format: str, levels: int 
     return device.create_texture(size=size, format=format, mip_level_count=levels, usage=usage)
 
 
-def pixels(device: Any, texture: Any) -> NDArray[Any]:
-    """(height, width, 3) texels of a four-channel texture, row 0 on top; waits for the GPU."""
+def texels(device: Any, texture: Any) -> NDArray[Any]:
+    """(height, width, 4) texels of a four-channel texture, row 0 on top; waits for the GPU."""
     width, height, _ = texture.size
     dtype = np.dtype({"rgba8unorm": np.uint8, "rgba16float": np.float16, "rgba32float": np.float32}[texture.format])
     rows = {"bytes_per_row": 4 * width * dtype.itemsize}
     data = device.queue.read_texture({"texture": texture}, rows, (width, height, 1))
-    return np.frombuffer(data, dtype).reshape(height, width, 4)[..., :3]
+    return np.frombuffer(data, dtype).reshape(height, width, 4)
+
+
+def pixels(device: Any, texture: Any) -> NDArray[Any]:
+    """(height, width, 3): `texels` without the last channel."""
+    return texels(device, texture)[..., :3]
 
 
 def stored(views: Iterable[Any], load_op: str = "clear") -> list[dict[str, Any]]:
