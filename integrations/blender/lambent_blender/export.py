@@ -10,7 +10,7 @@ import bpy
 
 from .assigned import material_notes, materials_of
 from .cameras import cameras_of, paths_of
-from .files import Copies
+from .files import Copies, missing_files
 from .geometry import LOST, SOLID, Named, escaped, renderable, write_glb
 from .lamps import FACE, Lamps
 from .properties import WISHES, setting
@@ -67,6 +67,8 @@ def _document(scene, view_layer, shown, folder, name, note):
     if not named.objects:
         raise ExportError(f"scene {scene.name} has nothing to export: its meshes have no faces")
     lamps = _lamps(shown, depsgraph, named, Lamps(frame, copies, note))
+    for sentence in missing_files():
+        note(sentence)
     for what in sorted({o.type for o in shown} & LOST):
         note(f"{what.lower()} objects are left out: {', '.join(o.name for o in shown if o.type == what)}")
     files = [{"file": geometry.name, "scale": frame.metres}]

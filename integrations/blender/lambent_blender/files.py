@@ -8,6 +8,15 @@ from pathlib import Path
 import bpy
 
 
+def missing_files():
+    """A sentence for each library and each used image of the .blend whose file is missing."""
+    images = [one for one in bpy.data.images if one.users and one.source == "FILE" and one.packed_file is None]
+    for kind, block in [*(("library", one) for one in bpy.data.libraries), *(("image", one) for one in images)]:
+        path = bpy.path.abspath(block.filepath, library=block.library)
+        if not Path(path).is_file():
+            yield f"{kind} {block.name}: {path} is missing: what uses it lacks it"
+
+
 @dataclass
 class Copies:
     """Copies below `folder`; what is missing goes to `note`."""
