@@ -1,12 +1,12 @@
-"""Compiled loops over the cells of floor plans, against what scipy and arithmetic have."""
+"""The cells of floor plans."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import binary_erosion, distance_transform_edt, label
+from scipy.ndimage import binary_erosion
 
-from lambent.core.geometry.plan_cells import filled, inner, share_filled, within, without_strips
-from lambent.scenes.floor_plan import Surroundings, floor_plan
+from lambent.core.geometry.plan_cells import filled
+from lambent.scenes.floor_plan import Surroundings, _inner, _without_strips, floor_plan
 from lambent.scenes.geometry import box, patch, placed
 
 RNG = np.random.default_rng(7)
@@ -24,30 +24,17 @@ def test_cells_are_filled_whose_centre_lies_in_a_triangle() -> None:
     assert not filled(triangles + 100, 32, 40).any()
 
 
-def test_shares_count_the_cells_of_each_square() -> None:
-    cells = RNG.random((12, 20)) < 0.5
-    expected = cells.reshape(3, 4, 5, 4).mean(axis=(1, 3))
-    assert np.array_equal(share_filled(cells, 4), expected)
-
-
-def test_distances_and_neighbours_are_those_of_scipy() -> None:
-    cells = RNG.random((40, 50)) < 0.02
-    for reach in (0.4, 1.0, 4.3, 9.0):
-        assert np.array_equal(within(cells, reach), distance_transform_edt(~cells) <= reach)
-    full = RNG.random((40, 50)) < 0.8
-    assert np.array_equal(inner(full), binary_erosion(full))
-
-
 def test_strips_along_the_edge_leave_and_islands_stay() -> None:
     covered = np.zeros((40, 40), bool)
     covered[4:36, 4:36] = True
     standing = np.zeros_like(covered)
     standing[6] = True  # cuts a strip two cells wide off
     standing[16:25, [16, 24]] = standing[[16, 24], 16:25] = True  # a block within
-    pieces, count = label(covered & ~standing)
-    found = without_strips(covered, pieces, count, 4.0)
+    found = _without_strips(covered, standing, 4.0)
     assert not found[:6].any() and found[6:36, 4:36].all()
-    assert np.array_equal(without_strips(covered, pieces, count, 1.0), covered)
+    assert np.array_equal(_without_strips(covered, standing, 1.0), covered)
+    full = RNG.random((40, 50)) < 0.8
+    assert np.array_equal(_inner(full), binary_erosion(full))
 
 
 def test_what_is_far_from_a_reflector_changes_nothing_and_is_left_out() -> None:
