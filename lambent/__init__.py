@@ -14,6 +14,9 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from lambent.api.bakes import Interreflection as Interreflection
+    from lambent.api.bakes import bake as bake
+    from lambent.api.bakes import propose as propose
     from lambent.api.checking import check as check
     from lambent.api.converting import convert as convert
     from lambent.api.glare import glare as glare
@@ -24,18 +27,19 @@ if TYPE_CHECKING:
     from lambent.api.reading import open as open
     from lambent.api.reading import read as read
     from lambent.api.scenes import Scene as Scene
-    from lambent.api.scenes import bake as bake
     from lambent.api.stores import Store as Store
     from lambent.api.tables import Fit as Fit
     from lambent.api.tables import Table as Table
+    from lambent.api.views import View as View
     from lambent.core.errors import UserError as UserError
 
 __version__ = "0.1.0"
 _MODULES = {
-    "Comparison": "api.pictures", "Fit": "api.tables", "Material": "api.materials", "Picture": "api.pictures",
-    "Scene": "api.scenes", "Store": "api.stores", "Table": "api.tables", "UserError": "core.errors",
-    "bake": "api.scenes", "check": "api.checking", "compare": "api.pictures", "convert": "api.converting",
-    "glare": "api.glare", "open": "api.reading", "read": "api.reading",
+    "Comparison": "api.pictures", "Fit": "api.tables", "Interreflection": "api.bakes", "Material": "api.materials",
+    "Picture": "api.pictures", "Scene": "api.scenes", "Store": "api.stores", "Table": "api.tables",
+    "UserError": "core.errors", "View": "api.views", "bake": "api.bakes", "check": "api.checking",
+    "compare": "api.pictures", "convert": "api.converting", "glare": "api.glare", "open": "api.reading",
+    "propose": "api.bakes", "read": "api.reading",
 }  # fmt: skip
 __all__ = ["__version__", *_MODULES]
 

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from lambent.api.describing import variants_in_words
 from lambent.api.materials import Material
-from lambent.api.progress import Wanted, progress_of
-from lambent.core.extras import needing_extras
+from lambent.api.progress import Wanted
 from lambent.core.views.camera import Camera
 from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Scene as Contents
@@ -73,6 +72,8 @@ class Scene:
 
     def bake(self, folder: str | Path, *, quality: str = "preview", progress: Wanted = None, **options: Any) -> Store:
         """Bake the scene into a store: `lambent.bake` of this scene."""
+        from lambent.api.bakes import bake
+
         return bake(self, folder, quality=quality, progress=progress, **options)
 
     def __repr__(self) -> str:
@@ -82,37 +83,3 @@ class Scene:
             f"Scene({scene.name!r}, {len(scene.objects)} objects, {self.triangles} triangles, "
             f"{len(scene.materials)} materials, {size} m)"
         )
-
-
-def bake(
-    scene: Scene | str | Path, folder: str | Path, *, quality: str = "preview", progress: Wanted = None, **options: Any
-) -> Store:
-    """Bake a scene into a store, or bring a store up to date; an interrupted bake resumes.
-
-    Parameters
-    ----------
-    scene : Scene, str or Path
-        A scene, or its file or "builtin:NAME".
-    folder : str or Path
-        Of the store, created if needed.
-    quality : {"preview", "normal", "final"}
-    progress : bool or callable, optional
-        As of `Table.fit`.
-    **options
-        As of `lambent.baking.bake.bake`: only, light_groups, light_fields, views, ...
-
-    Raises
-    ------
-    UserError
-        If an option is unknown, the scene has no objects or is too large, or no path tracing engine works.
-    KeyboardInterrupt
-        Finished work stays in the folder.
-    """
-    from lambent.api.stores import Store
-
-    read = scene if isinstance(scene, Scene) else Scene.read(scene)
-    with needing_extras(), progress_of(progress) as bar:
-        from lambent.baking.bake import bake as baked
-
-        baked(read.contents, Path(folder), quality=quality, progress=bar, **options).close()
-    return Store(folder)

@@ -20,12 +20,14 @@ from tests.viewer.editor.measured_specimens import BRASS, write_measurement
 HEAVY = ("numpy", "scipy", "mitsuba", "drjit", "wgpu", "imgui_bundle", "matplotlib", "zarr", "numba", "typer", "rich")
 # Changing a line here changes what users' scripts rely on: see CONTRIBUTING.md, "Public names".
 SIGNATURES = """
-bake(scene, folder, *, quality, progress, **options)
+bake(scene, folder, *, quality, only, resume, seed, light_map, probes, light_groups, light_fields, light_field_mb,\
+ views, session, interreflection, note, progress)
 check(subject, *, seed, reconstruction, progress, **values)
 compare(reference, test)
 convert(subject, file, *, as_, reconstruction, progress)
 glare(what, camera, *, threshold_cd_m2, note, progress, **settings)
 open(folder)
+propose(scene, *, views, session, interreflection, store, progress)
 read(file, *, reconstruction, crease_deg)
 Comparison.flip
 Comparison.psnr_db
@@ -66,6 +68,7 @@ Store.materials
 Store.render(self, camera, *, size, integrator, light, edits, variant, exposure_ev, view, note, progress, **settings)
 Store.sheet(self, file, camera, *, size, progress, **settings)
 Store.variants
+Store.view(self, camera, *, size, light, edits, variant, exposure_ev)
 Table.albedo(self, wi)
 Table.eval(self, wi, wo)
 Table.facts(self)
@@ -74,6 +77,12 @@ Table.name
 Table.plot(self, file)
 Table.read(file, reconstruction)
 Table.samples
+View.camera
+View.close(self)
+View.edits
+View.exposure_ev
+View.light
+View.picture
 """
 
 
