@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
 from lambent.api.materials import Material
 from lambent.api.progress import Wanted, progress_of
 from lambent.core.arrays import Floats
@@ -16,7 +18,6 @@ from lambent.materials.measured.protocol import MeasuredSamples, MeasuredTable
 
 if TYPE_CHECKING:
     from lambent.materials.fitting.result import FitResult
-    from lambent.scenes.scene import Environment
 
 
 Reconstruction = Literal["auto", "half_vector", "back_vector", "quadrilinear"]
@@ -51,11 +52,11 @@ class Table:
 
     def eval(self, wi: Floats, wo: Floats) -> Floats:
         """f (..., C) in 1/sr without the cosine, of wi, wo (..., 3); holes are filled from their neighbours."""
-        return self.table.eval(wi, wo)
+        return self.table.eval(np.asarray(wi, float), np.asarray(wo, float))
 
     def albedo(self, wi: Floats) -> Floats:
         """Share (..., C) of the light from wi (..., 3) that is scattered to either side."""
-        return self.table.albedo(wi)
+        return self.table.albedo(np.asarray(wi, float))
 
     def fit(
         self,
@@ -163,14 +164,16 @@ class Fit:
 
         return save_plots(self.table.samples, self.result.material, Path(folder), stem)
 
-    def report(self, file: str | Path, *, environment: Environment | None = None, progress: Wanted = None) -> None:
-        """Write a full report as one page (.html), with previews under an environment, by default daylight."""
+    def report(self, file: str | Path, *, environment: str | Path | None = None, progress: Wanted = None) -> None:
+        """Write a full report as one page (.html), with previews under a lat-long image, by default daylight."""
         from lambent.core.files import write_text
         from lambent.report import fit_report
+        from lambent.scenes.scene import ImageEnvironment
 
+        around = ImageEnvironment(Path(environment)) if environment is not None else None
         with progress_of(progress) as bar:
             page = fit_report.report(
-                self.table.table, self.table.samples, self.result, source=self.table.file, environment=environment,
+                self.table.table, self.table.samples, self.result, source=self.table.file, environment=around,
                 progress=bar,
             )  # fmt: skip
         write_text(Path(file), page)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from lambent.cli.console import Between, Force, Json, note, progress_bar, show, table, words
+from lambent.cli.console import Between, Force, Json, note, show, table, words
 from lambent.core.errors import UserError
 from lambent.materials.fitting.choices import DISTRIBUTION, DistributionChoice
 
@@ -67,12 +67,11 @@ def command(
 
     Example: lambent fit brushed.bsdf --lobes auto -o brushed.json --report brushed.html
     """
+    from lambent.api.tables import Table
     from lambent.core.outputs import check_output
-    from lambent.materials import measured
     from lambent.materials.fitting.account import below_zero
-    from lambent.materials.fitting.fit import fit
     from lambent.materials.fitting.parameters import parse_fix, parse_ranges
-    from lambent.materials.fitting.shown.plot import plot_files, save_plots
+    from lambent.materials.fitting.shown.plot import plot_files
     from lambent.materials.measured.inspecting.metrics import METRICS
 
     inputs = [file, *([] if environment is None else [environment])]
@@ -83,32 +82,23 @@ def command(
     if environment is not None:
         _check_environment(environment, report)
     count, fixed, ranges = _count(lobes), parse_fix(fix or ()), parse_ranges(range_ or ())
-    measurement = measured.load(file, reconstruction)
-    samples = measurement.samples()
-    with progress_bar() as progress:
-        result = fit(
-            samples, lobes=count, metric=metric, distribution=distribution, coupled=coupled, retro=retro, gain=gain,
-            fix=fixed, ranges=ranges, seed=seed, source=file, progress=progress, whole=measurement,
-            keep_albedo=keep_albedo,
-        )  # fmt: skip
+    table_of_file = Table.read(file, reconstruction)
+    fit = table_of_file.fit(
+        count, metric=metric, distribution=distribution, coupled=coupled, keep_albedo=keep_albedo, retro=retro,
+        gain=gain, fix=fixed, ranges=ranges, seed=seed, progress=True,
+    )  # fmt: skip
+    result, samples = fit.result, table_of_file.samples
     if output is not None:
-        result.material.save(output)
-    plots = save_plots(samples, result.material, plot.parent, plot.stem) if plot is not None else []
+        fit.material.save(output)
+    plots = fit.plots(plot.parent, plot.stem) if plot is not None else []
     if report is not None:
-        from lambent.core.files import write_text
-        from lambent.report import fit_report
-        from lambent.scenes.scene import ImageEnvironment
-
-        around = ImageEnvironment(environment) if environment is not None else None
-        with progress_bar() as bar:
-            page = fit_report.report(measurement, samples, result, source=file, environment=around, progress=bar)
-        write_text(report, page)
+        fit.report(report, environment=environment, progress=True)
     for warning in (*samples.info.notes, *result.notes, *below_zero(samples, METRICS[metric]), *result.warnings):
         note(warning)
     figures = ("errors", "lambertian_errors", "seconds", "partial", "warnings")
     facts = {"material": result.material.model_dump(mode="json"), **{key: getattr(result, key) for key in figures}}
     facts |= {"albedos": [one.to_json() for one in result.albedos]}
-    gone = left_out(measurement, samples)
+    gone = left_out(table_of_file.table, samples)
     facts |= {"tuples": {"used": len(samples), "left_out": gone}}
     text = f"{describe(result)}\n\n{describe_tuples(len(samples), gone)}\n\n{result.seconds:.1f} s"
     show({**facts, "written": output, "plots": plots, "report": report}, text, json)
