@@ -262,6 +262,18 @@ class Store:
         cell.begin(where, variant, mix, {name: one.document for name, one in (edits or {}).items()}, exposure_ev)
         return View(cell)
 
+    def light_map(self, file: str | Path) -> None:
+        """Write the light map as an image (.exr, W/m^2) and, beside it, its meshes (.glb), uv2 as second coordinates.
+
+        Raises
+        ------
+        UserError
+            If the store has no complete light map, or a file cannot be written.
+        """
+        from lambent.store.light_map_file import write_light_map
+
+        write_light_map(self.arrays, Path(file))
+
     def facts(self) -> dict[str, Any]:
         """Arrays, complete or not, whether every chunk on disk is sound, and what the scene offers, by name."""
         store, has_scene, groups = self.arrays, SCENE in self.arrays.documents, light_groups(self.arrays)

@@ -12,7 +12,6 @@ from __future__ import annotations
 import base64
 import json
 import math
-import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -22,6 +21,7 @@ from numpy.typing import NDArray
 
 from lambent.core.files import atomic_path
 from lambent.core.geometry.directions import Floats
+from lambent.core.glb import glb_bytes
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Material
 from lambent.materials.export import matching
@@ -126,7 +126,7 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     document, buffer = _sphere(fitted, material)
     with atomic_path(path) as temporary:
         if path.suffix.lower() == ".glb":
-            temporary.write_bytes(_binary(document, buffer))
+            temporary.write_bytes(glb_bytes(document, buffer))
         else:
             uri = f"data:application/octet-stream;base64,{base64.b64encode(buffer).decode()}"
             document["buffers"][0]["uri"] = uri
@@ -300,12 +300,3 @@ def _unit_sphere() -> tuple[Floats, Floats, NDArray[np.integer]]:
     caps = np.stack([a[-1], b[-1], d[-1]], axis=-1)
     used, faces = np.unique(np.concatenate([lower, upper, caps]), return_inverse=True)
     return normals.reshape(-1, 3)[used], tangents.reshape(-1, 3)[used], faces.reshape(-1, 3)
-
-
-def _binary(document: dict[str, Any], buffer: bytes) -> bytes:
-    """A GLB container (glTF 2.0, section 4)."""
-    text = json.dumps(document, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    buffer += b"\0" * (-len(buffer) % 4)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(buffer), b"BIN\0") + buffer
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks

@@ -1,0 +1,77 @@
+"""The light map for other programs: an EXR image, and beside it the meshes with the coordinates that it is read at."""
+
+from __future__ import annotations
+
+from itertools import accumulate
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lambent.core.errors import UserError
+from lambent.core.files import atomic_path
+from lambent.core.glb import glb_bytes
+from lambent.core.pictures.images import write_image
+from lambent.store.contract import SIDES, scene_record, whole_objects
+from lambent.store.store import Store
+
+ATTRIBUTES = {"positions": "POSITION", "normals": "NORMAL", "uv": "TEXCOORD_0", "uv2": "TEXCOORD_1"}
+FLOAT, UNSIGNED = 5126, 5125  # of glTF's components
+
+
+def meshes_beside(image: Path) -> Path:
+    """The .glb that belongs to a light map's image."""
+    return image.with_suffix(".glb")
+
+
+def write_light_map(store: Store, image: Path) -> None:
+    """Write irradiance, W/m^2 (.exr), and the objects with uv2 as their second coordinates (.glb of the same name).
+
+    The direct light of a sun is not in it: `contract`, light_map/irradiance.
+
+    Raises
+    ------
+    UserError
+        If the store has no complete light map, or a file cannot be written.
+    """
+    name = f"light_map/{SIDES[0]}"
+    if store.availability(name)[0] != "complete":
+        raise UserError("has no light map", file=store.folder, hint="bake it: lambent bake SCENE -o STORE")
+    write_image(image, store.read(name).astype(np.float32))
+    with atomic_path(meshes_beside(image)) as temporary:
+        temporary.write_bytes(_meshes(store))
+
+
+def _meshes(store: Store) -> bytes:
+    arrays = {name: store.read(f"geometry/{name}") for name in (*ATTRIBUTES, "faces")}
+    arrays["uv"] = arrays["uv"] * (1, -1) + (0, 1)  # glTF has v down; uv2 has it already
+    views: list[np.ndarray[Any, Any]] = []
+    accessors: list[dict[str, Any]] = []
+
+    def add(array: np.ndarray[Any, Any], component: int, kind: str) -> int:
+        ends = {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()} if kind == "VEC3" else {}
+        described = {"bufferView": len(views), "componentType": component, "count": len(array), "type": kind}
+        accessors.append({**described, **ends})
+        views.append(array.astype("<f4" if component == FLOAT else "<u4"))
+        return len(accessors) - 1
+
+    objects = whole_objects(scene_record(store).objects)
+    primitives = []
+    for o in objects:
+        used, corners = np.unique(arrays["faces"][o.first_face : o.first_face + o.face_count], return_inverse=True)
+        columns = {to: add(arrays[name][used], FLOAT, f"VEC{arrays[name].shape[1]}") for name, to in ATTRIBUTES.items()}
+        primitives.append({"attributes": columns, "indices": add(corners.ravel(), UNSIGNED, "SCALAR")})
+    sizes = [view.nbytes for view in views]
+    starts = [0, *accumulate(sizes)]
+    document = {
+        "asset": {"version": "2.0", "generator": "Lambent"}, "scene": 0,
+        "scenes": [{"nodes": list(range(len(objects)))}],
+        "nodes": [{"mesh": i, "name": o.name} for i, o in enumerate(objects)],
+        "meshes": [{"name": o.name, "primitives": [p]} for o, p in zip(objects, primitives, strict=True)],
+        "accessors": accessors,
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": a, "byteLength": n} for a, n in zip(starts, sizes, strict=False)
+        ],
+        "buffers": [{"byteLength": starts[-1]}],
+    }  # fmt: skip
+    return glb_bytes(document, b"".join(view.tobytes() for view in views))
