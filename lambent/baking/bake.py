@@ -23,7 +23,6 @@ from lambent.baking.light_fields import request
 from lambent.baking.methods import METHODS, check_groups, chosen
 from lambent.baking.probes.division import divided
 from lambent.baking.quality import Quality, quality_named
-from lambent.baking.running.memory import check_memory
 from lambent.baking.running.timing import Stopwatch
 from lambent.baking.running.watch import Watch
 from lambent.baking.running.workers import InProcess, Workers
@@ -33,13 +32,15 @@ from lambent.baking.surfaces.visible_triangles import TriangleVisibility
 from lambent.baking.transport.view import View
 from lambent.core.discovery import known, modules_in
 from lambent.core.errors import UserError
+from lambent.core.machine import memory_bytes
 from lambent.core.progress import Progress, silent
 from lambent.materials.factored.terms import Editable
 from lambent.scenes.looks.textures import prepared
-from lambent.scenes.scene import ImageEnvironment, Scene
+from lambent.scenes.scene import ImageEnvironment, Scene, SceneObject
 from lambent.store.source import changed_inputs, inputs_of, write_source
 from lambent.store.store import Store
 
+BYTES_PER_TRIANGLE = 650  # peak while baking geometry: 610 with 2000 objects of 352, 580 with one of a million
 log = logging.getLogger(__name__)
 
 
@@ -192,3 +193,32 @@ def in_order(kinds: Mapping[str, Artefact], wanted: Collection[str]) -> list[str
         return list(TopologicalSorter(dict(sorted(needs.items()))).static_order())
     except CycleError as error:
         raise UserError("artefacts need each other in a circle", got=" -> ".join(error.args[1])) from error
+
+
+def check_memory(scene: Scene) -> None:
+    """Raise `UserError` if the triangles of a scene do not fit into this machine's memory.
+
+    Instances share arrays in files and loaders, but not in a bake: each has its own light, and so its own vertices.
+    """
+    triangles = sum(len(o.mesh.faces) for o in scene.objects)
+    needed, there = triangles * BYTES_PER_TRIANGLE, memory_bytes()
+    if needed > there:
+        raise UserError(
+            "scene is too large to be baked here", field=scene.name,
+            got=f"{triangles} triangles, {needed / 1e9:.0f} GB", expected=f"at most {there / 1e9:.0f} GB of memory",
+            hint=_copies(scene.objects),
+        )  # fmt: skip
+
+
+def _copies(objects: tuple[SceneObject, ...]) -> str:
+    """A remedy that names the mesh with the most copies."""
+    shared: dict[int, list[SceneObject]] = {}
+    for o in objects:
+        shared.setdefault(id(o.mesh.faces), []).append(o)
+    most = max(shared.values(), key=lambda copies: len(copies) * len(copies[0].mesh.faces))
+    if len(most) == 1:
+        return f"{most[0].name} is the largest of its objects: simplify it"
+    return (
+        f"{most[0].name} and {len(most) - 1} more objects are copies of {len(most[0].mesh.faces)} triangles, each with "
+        "light of its own: leave some out, or simplify them"
+    )

@@ -137,7 +137,7 @@ def _direct_name(context: BakeContext, side: int) -> str:
 
 def _sampled_direct(context: BakeContext, side: int, lit: Floats) -> Floats:
     """Direct light (G, H, W, 3) of a side, sampled for a light map `lit` (G, H, W, 3) that keeps none."""
-    from lambent.baking.answering.direct import cleaned_direct
+    from lambent.baking.light.direct import cleaned_direct
     from lambent.baking.light.sampling import closed, sampled_halves
 
     labels = _direct_samples(context, side)
@@ -160,7 +160,7 @@ def _lit(context: BakeContext) -> list[Floats]:
 
 def _direct_by_group(context: BakeContext, side: int, lit: Floats, known: Flags, labels: Indices) -> Floats:
     """Direct light (G, H, W, 3) of separated light: the light map's own, denoised, plus light through lobes alone."""
-    from lambent.baking.answering.direct import cleaned_direct
+    from lambent.baking.light.direct import cleaned_direct
 
     parts = context.store.read(_by_group(TRACED[side]))[0].reshape(*known.shape, -1, 3)
     whole, straight = np.split(np.moveaxis(parts, 2, 0), 2)

@@ -165,7 +165,7 @@ def _choice(context: BakeContext) -> list[dict[str, Any]]:
     key = key_of(LIGHT_FIELD_CHOICE, 3, *inputs)
     said = context.store.documents.get(LIGHT_FIELD_CHOICE)
     if not isinstance(said, dict) or said.get("key") != key:
-        from lambent.baking.light_fields.choice import chosen
+        from lambent.baking.light_fields.choosing import chosen
 
         with context.timed(LIGHT_FIELD_CHOICE):
             others = [name for name in _shiny(context) if name not in named]

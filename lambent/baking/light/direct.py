@@ -1,4 +1,6 @@
-"""The direct part of a light map from the same paths: the direct share is denoised, not the direct light.
+"""The direct part of a light map, from few samples of its own (`cleaned_direct`), or from the same paths.
+
+Of the same paths, the direct share is denoised, not the direct light.
 
 Much of the noise of direct and total light is common to both, so shares are smoother than light, and a share of the
 finished map follows it along shadow edges and seams. The mean of quotients is not the quotient of means, so shares are
@@ -19,6 +21,7 @@ from lambent.core.light.colour import luminance
 
 MOST_BIAS = 1.5  # largest correction factor of a share
 MOST_RELATIVE = 1e6  # squared standard error by squared light
+SAME = 0.2  # of their sum: the most that halves' local means differ by in plain noise
 
 
 def direct_part(
@@ -63,3 +66,23 @@ def _trust(share: Floats, clean: Floats, whole: Floats, variance: Floats, known:
     relative = np.minimum(squared / np.maximum(of_light, 1e-20), MOST_RELATIVE)  # unlit charts must not overflow
     expected = relative * 2 * (1 - clean.mean(axis=-1)) ** 2
     return np.asarray(np.clip(1 - expected / np.maximum(found, 1e-12), 0, 1)[..., None])
+
+
+def cleaned_direct(halves: Floats, known: Flags, light: Floats, labels: Indices) -> NDArray[np.float16]:
+    """Direct light (H, W, 3) of a light map (H, W, 3): denoised, at most all of it.
+
+    Samples above the light map are cut first, at twice its light where both halves agree: light that lobes focus on a
+    few samples is in one half alone, and no filter takes it for noise.
+
+    Parameters
+    ----------
+    halves : (2, H, W, 3)
+        Noisy direct irradiance by independent samples, where `known`.
+    labels : (H, W) int
+        Chart of each texel.
+    """
+    given = np.asarray(light, np.float32) * known[..., None]
+    one, other = (chart_means(np.minimum(half, 2 * given), known, labels)[0] for half in halves)
+    same = np.abs(one - other) < SAME * (one + other)
+    clean = denoise_charts(np.minimum(halves.mean(axis=0), given * (1 + same)), known, labels)
+    return np.asarray(np.minimum(clean.astype(np.float16), np.asarray(light, np.float16)), np.float16)

@@ -1,20 +1,26 @@
-"""What a bake chooses: trials of the objects whose probes show viewers most that is wrong."""
+"""What a bake chooses: trials of the objects whose probes show viewers most that is wrong.
+
+What is wrong with an object is the error of its look-ups times the solid angle that it takes for viewers. Memory goes
+where it takes most of that away, until a budget is spent or a megabyte takes away too little of it. A light field is
+only taken where it lowers the error by a share WORTH of the probe's, and certainly lowers that at places held out from
+the choice, too.
+"""
 
 from __future__ import annotations
 
 import logging
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from lambent.baking.light_fields.acquisition import Surroundings
-from lambent.baking.light_fields.choice import MOST_TRIED, worth_trying
 from lambent.baking.light_fields.facing import turned_to_viewers
 from lambent.baking.light_fields.placing import Placing
-from lambent.baking.light_fields.trial import Option, ProbeLight, Trial, options_of, tried
+from lambent.baking.light_fields.trial import PROBE, Option, ProbeLight, Trial, options_of, tried
 from lambent.baking.light_fields.watched import Watched, watched
 from lambent.baking.probes.selection import Scaling
 from lambent.baking.running.tiles import seed_of
@@ -30,8 +36,11 @@ from lambent.store.store import Store
 
 MOST_WATCHED = 256  # objects whose probes are looked at
 REFLECTED = 0.9  # of an object's area, above which no light field is tried: planar reflectors show it
-
-
+WORTH = 0.05
+PER_MB = 0.0001  # of what is wrong with all objects that are tried: what a megabyte takes away at least
+CERTAINTY = 2.0  # standard errors by which the error falls at places held out, where noise does not favour the choice
+SHARE = 0.0002  # of what is wrong with all objects: those with less are not tried
+MOST_TRIED = 48
 LEFT_OUT = "light fields: tried on %d of %d shiny objects, the largest and worst; `--light-fields NAME` adds others"
 log = logging.getLogger(__name__)
 
@@ -141,3 +150,62 @@ def probe_light(store: Store, name: str) -> ProbeLight:
     scaling = Scaling(occlusion_gain(store, owner), has_even_niches(store, owner))
     light = radiance.astype(float) * unit
     return ProbeLight(light, distance.astype(float), planes, centre, np.array(whole) if len(whole) else None, scaling)
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """One object's light field, and what the trial found: errors in log(1 + L/median) of what viewers see."""
+
+    object: str
+    points: int
+    texels: int
+    megabytes: float
+    probe_error: float
+    error: float
+    size_sr: float
+
+    def said(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def worth_trying(wrong: Mapping[str, float]) -> list[str]:
+    """Of objects, by what is wrong with them, those that are tried, the worst first."""
+    total = sum(wrong.values())
+    names = sorted(wrong, key=lambda name: (-wrong[name], name))
+    return [name for name in names if wrong[name] > SHARE * total][:MOST_TRIED]
+
+
+def chosen(
+    trials: Mapping[str, Trial], budget_mb: float, bytes_per_texel: float, sample_map_mb: Callable[[str, int], float]
+) -> list[Chosen]:
+    """The objects that get a light field within a budget, the most worth first, and which.
+
+    `sample_map_mb` is the memory of a sample map, MB, by object and number of points.
+    """
+    taken, left = dict[str, Option](), budget_mb
+    least = PER_MB * sum(trial.probe * trial.size_sr for trial in trials.values())  # of a megabyte
+
+    def megabytes(name: str, option: Option) -> float:
+        if option == PROBE:
+            return 0.0
+        return option.points * option.texels**2 * bytes_per_texel / 1e6 + sample_map_mb(name, option.points)
+
+    while True:
+        best, gain, cost = None, 0.0, 0.0
+        for name, trial in trials.items():
+            before = taken.get(name, PROBE)
+            for option, error in trial.fields.items():
+                more, falls = megabytes(name, option) - megabytes(name, before), trial.error(before) - error
+                if not 0 < more <= left or falls <= WORTH * trial.probe:
+                    continue
+                worth = falls * trial.size_sr / more
+                if worth > max(gain, least) and trial.falls(before, option, CERTAINTY):
+                    best, gain, cost = (name, option), worth, more
+        if best is None:
+            break
+        taken[best[0]], left = best[1], left - cost
+    return [
+        Chosen(name, *option, megabytes(name, option), trial.probe, trial.error(option), trial.size_sr)
+        for name, option in taken.items()
+        for trial in (trials[name],)
+    ]

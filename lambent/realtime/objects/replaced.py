@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lambent.baked.light_fields.light_field import LightField
 from lambent.baked.light_fields.nearest_points import nearest_points
-from lambent.baked.probes.irradiance_volume import IrradianceVolume
+from lambent.baked.probes.irradiance import IrradianceVolume
 from lambent.core.arrays import Floats
 from lambent.core.discovery import known
 from lambent.core.errors import UserError

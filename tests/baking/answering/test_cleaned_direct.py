@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from lambent.baking.answering.direct import cleaned_direct
+from lambent.baking.light.direct import cleaned_direct
 
 LABELS = np.zeros((64, 64), int)
 KNOWN = np.ones((64, 64), bool)

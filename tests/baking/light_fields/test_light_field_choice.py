@@ -13,7 +13,7 @@ import pytest
 from lambent.baked.light_fields.stored import read_light_field
 from lambent.baking.bake import bake
 from lambent.baking.light_fields import choosing
-from lambent.baking.light_fields.choice import SHARE, WORTH, chosen, worth_trying
+from lambent.baking.light_fields.choosing import SHARE, WORTH, chosen, worth_trying
 from lambent.baking.light_fields.request import as_asked, light_fields_of, noted
 from lambent.baking.light_fields.trial import COUNTS, PROBE, Option, ProbeLight, Trial, helps, options_of
 from lambent.core.errors import UserError
@@ -156,7 +156,7 @@ def test_reflectors_show_shares_of_areas(beside: Scene, monkeypatch: pytest.Monk
     parts = [SimpleNamespace(object=name, area_m2=0.25) for name in ("corner", "corner", "gone")]
     record = SimpleNamespace(reflectors=[SimpleNamespace(parts=parts)])
     monkeypatch.setattr(choosing, "scene_record", lambda store: record)
-    shown = choosing.shown_by_reflectors(beside, cast(Any, None))
+    shown = choosing.shown_by_reflectors(beside, cast("Any", None))
     assert shown == {"corner": pytest.approx(0.5 / 0.58)}, "both large faces of a thin box"
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from lambent.baked.light_fields.light_field import NO_POINT, LightField
-from lambent.baked.probes.irradiance_volume import IrradianceVolume
+from lambent.baked.probes.irradiance import IrradianceVolume
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.octahedral import texel_directions

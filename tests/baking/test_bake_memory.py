@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from lambent.baking.bake import bake
-from lambent.baking.running import memory
+from lambent.baking import bake as baking
 from lambent.core.errors import UserError
 from lambent.scenes.geometry import placed, sphere
 from lambent.scenes.scene import Scene, SceneObject
@@ -22,15 +21,15 @@ def forest(count: int) -> Scene:
 def test_copies_beyond_memory_are_refused_with_their_number(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     scene = forest(50)
     triangles = sum(len(o.mesh.faces) for o in scene.objects)
-    monkeypatch.setattr(memory, "memory_bytes", lambda: memory.BYTES_PER_TRIANGLE * triangles - 1)
+    monkeypatch.setattr(baking, "memory_bytes", lambda: baking.BYTES_PER_TRIANGLE * triangles - 1)
     with pytest.raises(UserError, match="tree0 and 49 more objects are copies of 352 triangles"):
-        bake(scene, tmp_path / "s", quality=TINY, only={"geometry"})
+        baking.bake(scene, tmp_path / "s", quality=TINY, only={"geometry"})
     assert not (tmp_path / "s").exists()
-    memory.check_memory(forest(49))
+    baking.check_memory(forest(49))
 
 
 def test_one_large_object_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = replace(furnace(), objects=(*furnace().objects, SceneObject("big", sphere(1.0, 64, 32), "grey")))
-    monkeypatch.setattr(memory, "memory_bytes", lambda: 1000)
+    monkeypatch.setattr(baking, "memory_bytes", lambda: 1000)
     with pytest.raises(UserError, match="big is the largest"):
-        memory.check_memory(scene)
+        baking.check_memory(scene)
