@@ -63,8 +63,8 @@ Store.facts(self)
 Store.film(self, file, path, *, size, fps, light, variant, progress, **settings)
 Store.folder
 Store.illuminance(self, grid, *, over, height_m, spacing_m, margin_m, light, variant, error, maintenance, progress)
-Store.light_map(self, file)
 Store.light_groups
+Store.light_map(self, file)
 Store.materials
 Store.render(self, camera, *, size, integrator, light, edits, variant, exposure_ev, view, note, progress, **settings)
 Store.sheet(self, file, camera, *, size, progress, **settings)
