@@ -13,11 +13,12 @@ from itertools import pairwise
 import numpy as np
 
 from lambent.core.errors import UserError, did_you_mean
-from lambent.core.light.colour import XYZ_TO_RGB, hex_of, luminance, srgb_decode
+from lambent.core.light.colour import XYZ_TO_RGB, hex_of, luminance, rgb_to_xyz, srgb_decode
+from lambent.core.light.observer import black_body_xyz
 from lambent.core.plain import Triple, triple
 
 WHITE: Triple = (1.0, 1.0, 1.0)
-LEAST_K, MOST_K = 1667.0, 25000.0  # valid range of the fit to the Planckian locus
+LEAST_K, MOST_K = 1667.0, 25000.0  # of lamps and skies
 MOST_INTENSITY = 1000.0
 MOST_DUV = 0.05  # in CIE 1960 (u, v)
 EXPECTED = "NAME=VALUE, with VALUE an intensity, off, 2700K, #rrggbb, or several joined by commas"
@@ -133,24 +134,10 @@ def factors_of(names: Sequence[str], light: Factors) -> np.ndarray:
     return np.array([light.get(name, WHITE) for name in names], np.float32)
 
 
-def black_body(temperature_k: float) -> np.ndarray:
-    """Linear RGB (3,), luminance 1, of a black body at LEAST_K to MOST_K; no channel is negative.
-
-    Chromaticity by the cubic fit of Kang et al. 2002, "Design of advanced color temperature control system for HDTV".
-    """
-    t = 1e3 / temperature_k
-    if temperature_k < 4000:
-        x = -0.2661239 * t**3 - 0.2343589 * t**2 + 0.8776956 * t + 0.179910
-    else:
-        x = -3.0258469 * t**3 + 2.1070379 * t**2 + 0.2226347 * t + 0.240390
-    if temperature_k < 2222:
-        y = -1.1063814 * x**3 - 1.34811020 * x**2 + 2.18555832 * x - 0.20219683
-    elif temperature_k < 4000:
-        y = -0.9549476 * x**3 - 1.37418593 * x**2 + 2.09137015 * x - 0.16748867
-    else:
-        y = 3.0817580 * x**3 - 5.87338670 * x**2 + 3.75112997 * x - 0.37001483
-    rgb = np.maximum(XYZ_TO_RGB @ np.array([x / y, 1.0, (1 - x - y) / y]), 0)
-    return np.asarray(rgb / luminance(rgb))
+def black_body(temperature_k: np.ndarray | float) -> np.ndarray:
+    """Linear RGB (..., 3), luminance 1, of black bodies at LEAST_K to MOST_K; no channel is negative."""
+    rgb = np.maximum(black_body_xyz(temperature_k) @ XYZ_TO_RGB.T, 0)
+    return np.asarray(rgb / luminance(rgb)[..., None])
 
 
 def nearest_temperature_k(rgb: np.ndarray) -> float | None:
@@ -161,14 +148,14 @@ def nearest_temperature_k(rgb: np.ndarray) -> float | None:
     if not luminance(rgb) > 0:
         return None
     kelvin = np.geomspace(LEAST_K, MOST_K, 600)
-    off = np.linalg.norm(np.array([_uv(black_body(one)) for one in kelvin]) - _uv(np.asarray(rgb)), axis=1)
+    off = np.linalg.norm(_uv(black_body(kelvin)) - _uv(np.asarray(rgb)), axis=1)
     return float(kelvin[np.argmin(off)]) if off.min() <= MOST_DUV else None
 
 
 def _uv(rgb: np.ndarray) -> np.ndarray:
-    """CIE 1960 chromaticity (u, v) of a linear colour (3,)."""
-    x, y, z = np.linalg.solve(XYZ_TO_RGB, rgb)
-    return np.asarray(np.array([4 * x, 6 * y]) / (x + 15 * y + 3 * z))
+    """CIE 1960 chromaticity (..., 2) of linear colours (..., 3)."""
+    xyz = rgb_to_xyz(rgb)
+    return np.asarray(xyz[..., :2] * (4, 6) / (xyz @ (1, 15, 3))[..., None])
 
 
 def parse_light(texts: Iterable[str]) -> MixTrack:

@@ -26,3 +26,11 @@ def observer() -> Observer:
     text = (files("lambent.core.light") / "cie_1931.csv").read_text("ascii")
     columns = np.loadtxt(text.splitlines(), delimiter=",", skiprows=1)
     return Observer(columns[:, 0], columns[:, 1:4], columns[:, 4])
+
+
+def black_body_xyz(temperature_k: Floats | float) -> Floats:
+    """XYZ (..., 3) of black bodies at temperatures (...), in W/(sr m^2): Planck's law times the matching functions."""
+    metres = observer().wavelengths_nm * 1e-9
+    h, c, k = 6.62607015e-34, 2.99792458e8, 1.380649e-23
+    shares = np.expm1(h * c / (metres * k * np.asarray(temperature_k)[..., None]))
+    return np.asarray(2e-9 * h * c**2 / metres**5 / shares @ observer().matching)

@@ -15,7 +15,7 @@ from lambent.core.errors import UserError
 from lambent.core.geometry.directions import Floats
 from lambent.core.inputs import read_bytes
 from lambent.core.light.colour import XYZ_TO_RGB, srgb_decode
-from lambent.core.light.observer import observer
+from lambent.core.light.observer import black_body_xyz, observer
 from lambent.scenes.loaders.mitsuba.document import Document, Element
 
 Y_INTEGRAL_NM = 106.856895  # of the CIE 1931 luminosity function, as Mitsuba normalises emission
@@ -105,15 +105,8 @@ def _spectrum(element: Element, text: str, pairs: Sequence[Sequence[str | float]
         raise element.error("not a spectrum", got=text, expected="finite values at increasing wavelengths")
     if not emitted:
         return np.asarray(np.maximum(rgb_of_spectra(nm) @ values, 0))
-    observer_nm, matching = _observer()
-    radiance = np.interp(observer_nm, nm, values, left=0, right=0)
-    return np.asarray(np.maximum(XYZ_TO_RGB @ (radiance @ matching), 0))
-
-
-def _observer() -> tuple[Floats, Floats]:
-    """Wavelengths (K,) in nm, and the XYZ (K, 3) of a unit value at each."""
-    nm = observer().wavelengths_nm
-    return nm, observer().matching * (nm[1] - nm[0]) / Y_INTEGRAL_NM
+    radiance = np.interp(observer().wavelengths_nm, nm, values, left=0, right=0)
+    return np.asarray(np.maximum(XYZ_TO_RGB @ (radiance @ observer().matching) / Y_INTEGRAL_NM, 0))
 
 
 def _blackbody(element: Element) -> Floats:
@@ -125,8 +118,4 @@ def _blackbody(element: Element) -> Floats:
         raise element.error("not a temperature", got=text) from error
     if not (100 <= kelvin <= 1e6 and 0 <= scale < 1e12):
         raise element.error("not a temperature", got=text, expected="100 to 1e6 K")
-    nm, matching = _observer()
-    metres = nm * 1e-9
-    h, c, k = 6.62607015e-34, 2.99792458e8, 1.380649e-23
-    radiance_nm = 2 * h * c**2 / metres**5 / np.expm1(h * c / (metres * k * kelvin)) * 1e-9
-    return np.asarray(np.maximum(XYZ_TO_RGB @ (radiance_nm @ matching), 0) * scale)
+    return np.asarray(np.maximum(XYZ_TO_RGB @ black_body_xyz(kelvin) / Y_INTEGRAL_NM, 0) * scale)
