@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from lambent.api.describing import variants_in_words
+from lambent.api.describing import facts_of_store
 from lambent.api.materials import Material
 from lambent.api.pictures import Picture
 from lambent.api.progress import Wanted, progress_of
 from lambent.core.discovery import known
 from lambent.core.errors import UserError, invalid
 from lambent.core.extras import needing_extras
+from lambent.core.light.exposure import metered
 from lambent.core.light.light_mix import LightMix, MixTrack, parse_light
+from lambent.core.surroundings import Axis, Layout
 from lambent.core.views.camera import Camera
 from lambent.scenes.looks.variants import variant_named
 from lambent.scenes.scene import Look, Variant
@@ -130,36 +132,103 @@ class Store:
         )
         with needing_extras():
             drawn = self._images(said, edits or {}, note)
-        where = view_of(opened_with_views(self.arrays)[1], camera)
-        with needing_extras(), progress_of(progress) as bar:
-            radiance = drawn.radiance(where, bar)
-        details = {"integrator": drawn.settings.integrator, "samples": drawn.samples, "noise": drawn.noise}
-        return Picture(radiance, drawn.exposed(radiance), view, details=details)
+        return _picture(drawn, view_of(opened_with_views(self.arrays)[1], camera), progress)
+
+    def as_left(self, *, note: Note | None = None, progress: Wanted = None, **settings: Any) -> Picture:
+        """Render what the store's window showed last: its edits, lamps, light, camera, size, exposure and look.
+
+        Parameters and errors as of `render`; `settings` replace those of the session.
+        """
+        from lambent.render import as_left
+
+        given = {*settings} | ({"width", "height"} if "size" in settings else set())
+        wanted = self._settings(settings.pop("size", (1280, 720)), None, "", **settings)
+        chosen, camera = as_left(self.arrays, wanted, given)
+        with needing_extras():
+            return _picture(self._images(chosen, {}, note), camera or next(iter(self.cameras.values())), progress)
+
+    def edited(self, session: str | Path, *, surfaces: tuple[int, int] = (1, 99), **settings: Any) -> Picture:
+        """Draw the view of a session of edits (.edits.json), from the transport that the store has for it.
+
+        `surfaces` are the least and most on the shown light paths, 1 being direct light; `settings` as of `render`:
+        exposure_ev, view.
+        """
+        from lambent.render.edited import edited_view
+
+        return _picture(
+            *edited_view(self.arrays, Path(session), self._settings((1, 1), None, "", **settings), surfaces)
+        )
+
+    def relight(
+        self,
+        camera: str | None = None,
+        *,
+        environment: str | Path | None = None,
+        layout: Layout | None = None,
+        up: Axis = "+y",
+        scale: float = 1.0,
+        turn_deg: float = 0.0,
+    ) -> Picture:
+        """Draw a view under a turned or another environment: direct light with shadows.
+
+        Parameters
+        ----------
+        camera : str, optional
+            Of a view that was baked for relighting, by name; by default the first. `UserError` if there is none.
+        environment : str or Path, optional
+            Picture that lights the scene; by default the scene's own environment.
+        layout, up, scale
+            Of the picture: recognised by default; the world axis of its up direction; factor on its radiance.
+        turn_deg : float
+            Rotation of the environment about +y.
+        """
+        from lambent.editing.relit_view import RelitView, views_for_relighting
+        from lambent.scenes.scene import ImageEnvironment
+
+        if not (views := views_for_relighting(self.arrays)):
+            hint = "see docs/editing.md, Relighting"
+            raise UserError("has no view baked for relighting", file=self.folder, hint=hint)
+        record = views[next(iter(views)) if camera is None else known("camera", camera, views, field="--camera")]
+        view = RelitView(self.arrays, record.camera, record.width, record.height)
+        if environment is not None:
+            view.light(ImageEnvironment(Path(environment), scale, 0.0, layout, up))
+        view.turn(turn_deg)
+        view.draw()
+        image = view.image()
+        details = {"camera": record.camera.name, "left_out": view.error}
+        return Picture(image, metered(image) or 0.0, details=details)
 
     def film(
         self, file: str | Path, path: str | None = None, *, size: tuple[int, int] = (1280, 720), fps: int = 30,
-        light: Light | None = None, variant: str = "", progress: Wanted = None, **settings: Any,
+        light: Light | None = None, variant: str = "", keyframes: str | Path | None = None, progress: Wanted = None,
+        **settings: Any,
     ) -> Rendered:  # fmt: skip
         """Write a film (.mp4) or an image sequence (.png, .exr with # signs) along a camera path, by default the first.
 
-        Other parameters and errors as of `render`.
+        `keyframes` is a file of materials and light over time (.toml); other parameters and errors as of `render`.
         """
         from lambent.render import film
 
         with needing_extras(), progress_of(progress) as bar:
             return film(
-                self.arrays, file, path, self._settings(size, light, variant, **settings), fps=fps, progress=bar
-            )
+                self.arrays, file, path, self._settings(size, light, variant, **settings), fps=fps,
+                keyframes=None if keyframes is None else Path(keyframes), progress=bar,
+            )  # fmt: skip
 
     def sheet(
         self, file: str | Path, camera: str | None = None, *, size: tuple[int, int] = (640, 360),
-        progress: Wanted = None, **settings: Any,
+        exposures: Literal["light", "each", "one"] = "light", progress: Wanted = None, **settings: Any,
     ) -> Rendered:  # fmt: skip
-        """Write a contact sheet of all variants (.png); parameters and errors as of `render`."""
+        """Write a contact sheet of all variants (.png).
+
+        `exposures`: metered once for each mix of light, for each picture, or as the first; other parameters and errors
+        as of `render`.
+        """
         from lambent.render import sheet
 
         with needing_extras(), progress_of(progress) as bar:
-            return sheet(self.arrays, file, camera, self._settings(size, None, "", **settings), progress=bar)
+            chosen = self._settings(size, None, "", **settings)
+            return sheet(self.arrays, file, camera, chosen, exposures=exposures, progress=bar)
 
     def illuminance(
         self,
@@ -276,18 +345,7 @@ class Store:
 
     def facts(self) -> dict[str, Any]:
         """Arrays, complete or not, whether every chunk on disk is sound, and what the scene offers, by name."""
-        store, has_scene, groups = self.arrays, SCENE in self.arrays.documents, light_groups(self.arrays)
-        return {
-            "is": "store",
-            "arrays": {
-                a.name: f"{'x'.join(map(str, a.shape))} {a.dtype}, {_health(store, a)}" for a in store.artefacts()
-            },
-            "documents": sorted(store.documents),
-            "light_groups": {g.name: f"{g.share:.1%} of the light: {', '.join(g.members)}" for g in groups},
-            "variants": variants_in_words(variants_of(store) if has_scene else ()),
-            "reflectors": _reflectors(store) if has_scene else [],
-            "inputs": store.inputs,
-        }
+        return facts_of_store(self.arrays)
 
     def _settings(self, size: tuple[int, int], light: Light | None, variant: str, **settings: Any) -> Settings:
         from lambent.render import Settings
@@ -333,21 +391,8 @@ class Store:
         )
 
 
-def _health(store: Arrays, artefact: Any) -> str:
-    if not artefact.complete:
-        return str(artefact.state)
-    try:
-        store.read(artefact.name)
-    except UserError as error:
-        return error.message
-    return "complete"
-
-
-def _reflectors(store: Arrays) -> list[str]:
-    """Planar reflectors in words: area, objects, plane."""
-    words = []
-    for r in scene_record(store).reflectors:
-        *n, d = (round(x, 3) + 0.0 for x in r.plane)
-        area = sum(part.area_m2 for part in r.parts)
-        words.append(f"{area:.2f} m2 of {', '.join(part.object for part in r.parts)}: n {n}, d {d}")
-    return words
+def _picture(drawn: Images, camera: Camera, progress: Wanted = None) -> Picture:
+    with needing_extras(), progress_of(progress) as bar:
+        radiance = drawn.radiance(camera, bar)
+    details = {"integrator": drawn.settings.integrator, "samples": drawn.samples, "noise": drawn.noise}
+    return Picture(radiance, drawn.exposed(radiance), drawn.settings.view, details=details)

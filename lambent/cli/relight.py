@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -12,10 +12,6 @@ from lambent.cli.console import Force, Json, parse_size, show
 from lambent.cli.walk import SIZE, Size
 from lambent.core.errors import UserError
 from lambent.core.surroundings import Axis, Layout
-
-if TYPE_CHECKING:
-    from lambent.store.contract import ViewRecord
-    from lambent.store.store import Store
 
 
 def command(
@@ -56,38 +52,18 @@ def command(
         sky = None if environment is None else {"path": environment, "layout": layout, "up": up, "scale": scale}
         app.run(store, "relight", size=pixels, camera=camera, environment=sky, turn_deg=turn)
         return
-    from lambent.core.light.colour import shown
-    from lambent.core.light.exposure import metered
+    from dataclasses import replace
+
+    from lambent.api.stores import Store
     from lambent.core.outputs import check_output
-    from lambent.core.pictures.images import WRITABLE, to_bytes, write_image, write_shown
-    from lambent.editing.relit_view import RelitView
-    from lambent.scenes.scene import ImageEnvironment
-    from lambent.store.store import Store
+    from lambent.core.pictures.images import WRITABLE
 
     check_output(output, WRITABLE, force=force)
-    opened = Store.open(store)
-    record = _chosen(opened, camera)
-    view = RelitView(opened, record.camera, record.width, record.height)
-    if environment is not None:
-        view.light(ImageEnvironment(environment, scale, 0.0, layout, up))
-    view.turn(turn or 0.0)
-    view.draw()
-    image = view.image()
-    if output.suffix.lower() == ".png":
-        exposure_ev = exposure if exposure is not None else metered(image) or 0.0
-        write_shown(output, to_bytes(shown(image, "filmic", exposure_ev)))
-    else:
-        write_image(output, image)
-    facts = {"written": output, "camera": record.camera.name, "size": [record.width, record.height]}
-    text = f"{output}: {record.width}x{record.height}, camera {record.camera.name}, left out {100 * view.error:.2g} %"
-    show({**facts, "left_out": view.error}, text, json)
-
-
-def _chosen(store: Store, camera: str | None) -> ViewRecord:
-    from lambent.core.discovery import known
-    from lambent.editing.relit_view import views_for_relighting
-
-    views = views_for_relighting(store)
-    if not views:
-        raise UserError("has no view baked for relighting", file=store.folder, hint="see docs/editing.md, Relighting")
-    return views[known("camera", camera, views, field="--camera") if camera is not None else next(iter(views))]
+    picture = Store(store).relight(
+        camera, environment=environment, layout=layout, up=up, scale=scale, turn_deg=turn or 0.0
+    )
+    (picture if exposure is None else replace(picture, exposure_ev=exposure)).save(output)
+    height, width = picture.radiance.shape[:2]
+    name, left_out = picture.details["camera"], picture.details["left_out"]
+    text = f"{output}: {width}x{height}, camera {name}, left out {100 * left_out:.2g} %"
+    show({"written": output, "camera": name, "size": [width, height], "left_out": left_out}, text, json)

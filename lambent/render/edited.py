@@ -45,14 +45,26 @@ def edited_still(
     settings: Settings = DEFAULT,
     surfaces: tuple[int, int] = ALL_HITS,
 ) -> Rendered:
-    """Draw the view of a session with its edits, from the transport and the interreflections in a store.
+    """Draw the view of a session with its edits into a file; parameters as of `edited_view` and `output.still`."""
+    began, file = time.perf_counter(), Path(file)
+    check_writable(file, WRITABLE)
+    drawn, camera = edited_view(store, session, settings, surfaces)
+    write_still(drawn, file, camera)
+    width, height = drawn.settings.width, drawn.settings.height
+    return Rendered(file, width, height, EDITED, 1, time.perf_counter() - began, **displayed_as(file, drawn))
+
+
+def edited_view(
+    store: Store | Path | str, session: Path, settings: Settings = DEFAULT, surfaces: tuple[int, int] = ALL_HITS
+) -> tuple[Edited, Camera]:
+    """Images of a session's view with its edits, from the transport and interreflections of a store; and its camera.
 
     Parameters
     ----------
     session : path
         A session's file; its camera and size replace those of `settings`.
-    file, settings
-        As in `output.still`: exposure, view transform and false colours.
+    settings
+        Exposure, view transform and false colours.
     surfaces
         Least and most surfaces on the shown light paths.
 
@@ -62,8 +74,6 @@ def edited_still(
         If the session or the store cannot be used, or the store lacks the transport; the hint is then the command that
         bakes it.
     """
-    began, file = time.perf_counter(), Path(file)
-    check_writable(file, WRITABLE)
     opened = store if isinstance(store, Store) else Store.open(Path(store))
     wanted = Session.open(Path(session))
     width, height = wanted.document.size
@@ -75,9 +85,7 @@ def edited_still(
             error.message, file=error.file, field=error.field, got=error.got, expected=error.expected,
             hint=f"run `{_bake_command(opened, wanted, Path(session))}`",
         ) from error  # fmt: skip
-    drawn = Edited(picture, settings)
-    write_still(drawn, file, wanted.document.camera)
-    return Rendered(file, width, height, EDITED, 1, time.perf_counter() - began, **displayed_as(file, drawn))
+    return Edited(picture, settings), wanted.document.camera
 
 
 def _bake_command(store: Store, wanted: Session, session: Path) -> str:

@@ -1,6 +1,8 @@
-"""`lambent.check`, `convert` and `glare` do what the commands do."""
+"""What the API does as the commands do: check, convert, glare; what a store's window left, views under another sky."""
 
 from __future__ import annotations
+
+import shutil
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from lambent.core.geometry.directions import direction
 from lambent.core.light.photometry import photometric
 from lambent.materials.document import Lobe
 from lambent.materials.document import Material as Document
+from lambent.store.kept.session import FILE, RoomState, WalkSession, write_session
 
 BRIGHT = Document(name="bright", kd=0.9, lobes=(Lobe(mx=0.1, my=0.1, r0=0.9),))
 
@@ -51,3 +54,17 @@ def test_glare_of_a_view_in_a_store(adapter, baked_box):
     assert brightest == pytest.approx(found.sources[0].luminance, rel=0.1)
     with pytest.raises(lambent.UserError, match="applies to stores only"):
         lambent.glare(baked_box / "manifest.json", "front")
+
+
+def test_a_room_as_its_window_left_it(adapter, baked_box, tmp_path):
+    folder = tmp_path / "box.store"
+    shutil.copytree(baked_box, folder)
+    store = lambent.open(folder)
+    with pytest.raises(lambent.UserError, match="there is no session"):
+        store.as_left()
+    blue = Document(name="red", kd=(0.1, 0.1, 0.6))
+    session = WalkSession(now=RoomState(materials={"red": blue}))
+    write_session(folder / FILE, session)
+    size = {"size": (48, 36), "integrator": "lamps"}
+    left, edited = store.as_left(**size), store.render("front", edits={"red": lambent.Material(blue)}, **size)
+    np.testing.assert_allclose(left.radiance, edited.radiance, rtol=1e-2, atol=1e-3)

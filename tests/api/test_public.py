@@ -58,16 +58,19 @@ Scene.materials
 Scene.name
 Scene.read(file, crease_deg)
 Scene.triangles
+Store.as_left(self, *, note, progress, **settings)
 Store.cameras
+Store.edited(self, session, *, surfaces, **settings)
 Store.facts(self)
-Store.film(self, file, path, *, size, fps, light, variant, progress, **settings)
+Store.film(self, file, path, *, size, fps, light, variant, keyframes, progress, **settings)
 Store.folder
 Store.illuminance(self, grid, *, over, height_m, spacing_m, margin_m, light, variant, error, maintenance, progress)
 Store.light_groups
 Store.light_map(self, file)
 Store.materials
+Store.relight(self, camera, *, environment, layout, up, scale, turn_deg)
 Store.render(self, camera, *, size, integrator, light, edits, variant, exposure_ev, view, note, progress, **settings)
-Store.sheet(self, file, camera, *, size, progress, **settings)
+Store.sheet(self, file, camera, *, size, exposures, progress, **settings)
 Store.variants
 Store.view(self, camera, *, size, light, edits, variant, exposure_ev)
 Table.albedo(self, wi)
