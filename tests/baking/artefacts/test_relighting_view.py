@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import lambent
 from lambent.baking.artefacts import relighting
 from lambent.baking.bake import bake
 from lambent.baking.quality import quality_named
@@ -164,6 +165,18 @@ def test_pixels_beside_surfaces_show_the_environment(folder: Path) -> None:
         view.light(given)
         view.turn(180.0)
         assert np.allclose(view.image()[0, [0, -1]], [[0, 1, 0], [1, 0, 0]])
+
+
+def test_python_draws_it(store: Store, view: RelitView, folder: Path) -> None:
+    opened = lambent.open(store.folder)
+    other = sky(folder, "other.exr", 5)
+    view.light(ImageEnvironment(other, 2.0))
+    view.turn(90.0)
+    shown = opened.relight(CAMERA.name, environment=other, scale=2.0, turn_deg=90.0)
+    np.testing.assert_allclose(shown.radiance, drawn(view), rtol=1e-6)
+    assert shown.details == {"camera": CAMERA.name, "left_out": view.error}
+    with pytest.raises(UserError, match="unknown camera"):
+        opened.relight("below")
 
 
 def test_what_cannot_be_is_said(store: Store, view: RelitView) -> None:
