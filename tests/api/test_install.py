@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from lambent.cli.doctor import PACKAGES
 from lambent.core.extras import EXTRAS
 from tests.viewer.editor.measured_specimens import BRASS, write_measurement
 
@@ -86,6 +87,17 @@ def test_shells_complete_commands_and_options(shell, words, expected):
     command = [sys.executable, "-m", "lambent.cli.main"]
     done = subprocess.run(command, capture_output=True, text=True, env=asked, cwd=ROOT)
     assert expected in done.stdout, done
+
+
+def test_the_container_installs_what_the_doctor_asks_for():
+    lines = (ROOT / "Containerfile").read_text("utf-8").replace("\\\n", " ").splitlines()
+    words = {word for line in lines if line.startswith("RUN") for word in line.split()}
+    for check in ("path tracer", "graphics"):
+        for package in PACKAGES[check]["apt-get"]:
+            assert words & {*package.split("|")}, package
+    copied = [word for line in lines if line.startswith("COPY") for word in line.split()[1:-1]]
+    kept = {line[1:] for line in (ROOT / ".dockerignore").read_text("utf-8").splitlines() if line.startswith("!")}
+    assert {*copied} == kept and all((ROOT / name).exists() for name in copied)
 
 
 @pytest.mark.slow
