@@ -22,7 +22,7 @@ MARK = "# Exported from Blender by Lambent; the next export replaces this file."
 MOST_GROUPS = 7
 
 
-class ExportError(Exception):
+class ExportError(RuntimeError):
     """What keeps a scene from being exported, in one line."""
 
 

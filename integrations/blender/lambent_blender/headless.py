@@ -13,7 +13,7 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from lambent_blender import properties
-from lambent_blender.export import ExportError, export_scene
+from lambent_blender.export import export_scene
 
 
 def main(file, folder):
@@ -22,7 +22,7 @@ def main(file, folder):
     try:
         bpy.ops.wm.open_mainfile(filepath=file, load_ui=False, use_scripts=False)
         exported = export_scene(folder, Path(file).stem)
-    except (ExportError, RuntimeError) as error:
+    except RuntimeError as error:
         return {"error": " ".join(str(error).split()).removeprefix("Error: ")}
     return {"scene": str(exported.scene), "notes": exported.notes}
 

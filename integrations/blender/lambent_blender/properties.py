@@ -29,6 +29,10 @@ DECLARED = (
         "Collection", "lambent_light_group",
         BoolProperty(name="Light group", description="Its lights are dimmed together", default=False),
     ),
+    (
+        "Scene", "lambent_quality",
+        EnumProperty(name="Quality", items=[(key, key.title(), "") for key in ("PREVIEW", "NORMAL", "FINAL")]),
+    ),
 )  # fmt: skip
 
 
