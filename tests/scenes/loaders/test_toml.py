@@ -13,6 +13,7 @@ from lambent.core.geometry.triangles import triangle_areas
 from lambent.core.light.exposure import exposure_of
 from lambent.core.light.photometry import photometric
 from lambent.materials.document import Material
+from lambent.scenes.camera_paths import camera_at
 from lambent.scenes.geometry import patch
 from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.loaders.scene_toml.assembly import assigned
@@ -163,6 +164,28 @@ def test_lamps_in_photometric_units(tmp_path: Path) -> None:
     lamp, ball = scene.object("lamp"), scene.object("sphere")
     assert photometric(np.array(lamp.emission)) * np.pi * triangle_areas(lamp.mesh.corners).sum() == pytest.approx(500)
     assert ball.emission == pytest.approx((10, 10, 10))
+
+
+def test_a_luminaire_is_scaled_and_turned(tmp_path: Path) -> None:
+    (tmp_path / "lamp.ies").write_text("TILT=NONE\n1 -1 1 3 1 1 2 0 0 0 1 1 1\n0 90 180\n0\n7 7 7\n")
+    lamp = "[[lights]]\nkind = 'ies'\nfile = 'lamp.ies'\nposition = [0.0, 2.0, 0.0]\n"
+    scene = load_scene(written(tmp_path, f"{MATERIALS}{lamp}{lamp}scale = 0.5\nacross = [0.0, 3.0, -4.0]"))
+    plain, changed = scene.lights
+    assert isinstance(plain, IesLight) and isinstance(changed, IesLight)
+    assert np.array(changed.scale) == pytest.approx(0.5 * np.array(plain.scale))
+    assert plain.axes[0] == pytest.approx((1, 0, 0)) and changed.axes[0] == pytest.approx((0, 0, -1), abs=1e-9)
+
+
+def test_keys_of_a_path_have_times(tmp_path: Path) -> None:
+    keys = ", ".join(f"{{ position = [{x}.0, 0.5, 2.0], target = [0.0, 0.5, 0.0] }}" for x in range(3))
+    path = f"[[paths]]\nname = 'slowing'\nseconds = 4.0\ntimes_s = [0.0, 1.0, 4.0]\nkeys = [{keys}]"
+    (found,) = load_scene(written(tmp_path, MATERIALS + path)).paths
+    assert found.times_s == (0, 1, 4) and camera_at(found, 1).position == (1, 0.5, 2)
+    for times in ("[0.0, 4.0]", "[0.0, 2.0, 3.0]", "[0.0, 5.0, 4.0]", "[1.0, 2.0, 4.0]"):
+        with pytest.raises(
+            UserError, match=r"paths\.0.*times_s has an increasing time for each key, from 0 to seconds"
+        ):
+            load_scene(written(tmp_path, MATERIALS + path.replace("[0.0, 1.0, 4.0]", times)))
 
 
 def test_exposure_as_ev100_or_none(tmp_path: Path) -> None:
