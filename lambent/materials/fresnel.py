@@ -1,4 +1,4 @@
-"""Fresnel reflectance, exact and by Schlick's approximation.
+"""Factors of microfacet models: Fresnel reflectance, exact and by Schlick's approximation, and Smith's masking.
 
 Cosines are between a direction and the facet's normal, in [0, 1]. `lobes.fresnel` is the Schlick term for the path
 tracer.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from lambent.core.arrays import Floats
+from lambent.materials.document import Distribution
 
 
 def schlick_weight(cos_d: Floats) -> Floats:
@@ -45,3 +46,14 @@ def ior_of(r0: float) -> float:
     """Inverse of `r0_of`: the index above 1."""
     root = float(np.sqrt(r0))
     return (1 + root) / (1 - root)
+
+
+def smith_lambda(slope2: Floats, distribution: Distribution) -> Floats:
+    """Smith's Lambda of GGX (Heitz 2014, eq. 72) or Beckmann facets for slope2 = (m tan theta)^2; G1 = 1/(1 + Lambda).
+
+    Beckmann's is the rational fit of Walter et al. 2007, as Mitsuba and pbrt use it.
+    """
+    if distribution == "ggx":
+        return np.asarray((np.sqrt(1 + slope2) - 1) / 2)
+    a = 1 / np.sqrt(np.maximum(slope2, 1e-12))
+    return np.where(a >= 1.6, 0.0, (1 - 1.259 * a + 0.396 * a * a) / (3.535 * a + 2.181 * a * a))

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from lambent.core.geometry.directions import normalize, raised
-from lambent.materials.fresnel import schlick
+from lambent.materials.fresnel import schlick, smith_lambda
 from lambent.materials.models.model import Floats, Model, Parameter, reflected, upper
 
 
@@ -55,7 +55,7 @@ class Ggx(Model):
     def _lambda(self, w: Floats) -> Floats:
         """Smith's Lambda (Heitz 2014, eq. 86)."""
         x, y = w[..., 0] * self.number("alpha_x"), w[..., 1] * self.number("alpha_y")
-        return np.asarray((np.sqrt(1 + (x * x + y * y) / w[..., 2] ** 2) - 1) / 2)
+        return smith_lambda((x * x + y * y) / w[..., 2] ** 2, "ggx")
 
     def _visible_normal(self, wo: Floats, u1: Floats, u2: Floats) -> Floats:
         """Normal with density G1 D (wo.h) / wo.z for wo on the upper side (Heitz 2018, listing 1)."""

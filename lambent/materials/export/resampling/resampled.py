@@ -23,7 +23,7 @@ from lambent.materials import lobes
 from lambent.materials.bsdf import MaterialBSDF, components
 from lambent.materials.document import BLACK, Distribution, Lobe, Material
 from lambent.materials.export.contract import Cost, Subject
-from lambent.materials.fresnel import schlick_weight
+from lambent.materials.fresnel import schlick_weight, smith_lambda
 from lambent.materials.lobes import Vector
 from lambent.materials.measured.inspecting.inspection import retro, towards_light
 from lambent.materials.measured.inspecting.metrics import errors_and_shares, light_ratios
@@ -80,19 +80,9 @@ class Pairs:
 
     def _masking(self, mx: float, my: float, masking: Masking, distribution: Distribution) -> Floats:
         """(N,) Smith's G in [0, 1]."""
-        smith = _beckmann_lambda if distribution == "beckmann" else _ggx_lambda
-        one, other = (smith(((mx * w[0]) ** 2 + (my * w[1]) ** 2) / w[2] ** 2) for w in (self.wi, self.wo))
+        slopes2 = (((mx * w[0]) ** 2 + (my * w[1]) ** 2) / w[2] ** 2 for w in (self.wi, self.wo))
+        one, other = (smith_lambda(slope2, distribution) for slope2 in slopes2)
         return np.asarray(1 / (1 + one + other) if masking == "correlated" else 1 / ((1 + one) * (1 + other)))
-
-
-def _ggx_lambda(slope2: Floats) -> Floats:
-    return np.asarray((np.sqrt(1 + slope2) - 1) / 2)
-
-
-def _beckmann_lambda(slope2: Floats) -> Floats:
-    """Walter's rational fit of Beckmann's Lambda, as Mitsuba and pbrt use it; slope2 is (alpha tan theta)^2."""
-    a = 1 / np.sqrt(np.maximum(slope2, 1e-12))
-    return np.where(a >= 1.6, 0.0, (1 - 1.259 * a + 0.396 * a * a) / (3.535 * a + 2.181 * a * a))
 
 
 def is_grey(material: Material) -> bool:

@@ -20,6 +20,7 @@ from lambent.core.ceilings import LOBES
 from lambent.core.errors import did_you_mean
 from lambent.core.geometry.directions import Floats
 from lambent.core.plain import is_number
+from lambent.materials.fresnel import conductor
 from lambent.scenes.loaders.mitsuba import fresnel
 from lambent.scenes.loaders.mitsuba.fresnel import COS, IOR, METALS, nearest_fresnel, nearest_passage
 from lambent.scenes.loaders.mitsuba.principled import principled
@@ -303,7 +304,7 @@ def _metal(plugin: Plugin) -> tuple[Floats, Floats]:
     if plugin.has("eta", "k"):
         plugin.ignore("material")
         eta, k = colour(plugin, "eta", 0.0).mean / around, colour(plugin, "k", 1.0).mean / around
-        fits = [nearest_fresnel(fresnel.fresnel(COS, complex(n, -x))) for n, x in zip(eta, k, strict=True)]
+        fits = [nearest_fresnel(conductor(COS, n, x)) for n, x in zip(eta, k, strict=True)]
         r0, rise = np.array(fits).T
         return r0, rise
     name = plugin.text("material", "Cu")

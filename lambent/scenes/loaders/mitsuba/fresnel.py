@@ -15,41 +15,34 @@ from functools import cache
 import numpy as np
 
 from lambent.core.geometry.directions import Floats
+from lambent.materials.document import Distribution
+from lambent.materials.fresnel import conductor, smith_lambda
 
 COSINES, FACETS = 128, 48  # Gauss-Legendre points over cos theta_i; quadrature over facets, each way
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(COSINES)
 COS = (GAUSS_POINTS + 1) / 2  # where Fresnel's terms are compared
 
 
-def fresnel(cos_i: Floats, eta: float | complex) -> Floats:
-    """Fresnel reflectance of unpolarised light at the relative index eta (eta - ik of metals), inside by outside."""
-    inside = np.conj(complex(eta)) if abs(eta) > 1e-3 else 1e-3 + 0j
-    cos_t = np.sqrt(1 - (1 - cos_i**2) / inside**2 + 0j)
-    across = (cos_i - inside * cos_t) / (cos_i + inside * cos_t)
-    parallel = (inside * cos_i - cos_t) / (inside * cos_i + cos_t)
-    return np.asarray((np.abs(across) ** 2 + np.abs(parallel) ** 2) / 2)
-
-
-def reflectance(cos_i: Floats, eta: float, m: float = 0.0, distribution: str = "ggx") -> Floats:
+def reflectance(cos_i: Floats, eta: float, m: float = 0.0, distribution: Distribution = "ggx") -> Floats:
     """Share of the light from one direction that is reflected, at cos_i (N,); m is the slope roughness."""
     if m == 0:
-        return fresnel(cos_i, eta)
+        return conductor(cos_i, eta, 0.0)
     ci, z, cos_d = _facets(cos_i, m, distribution)
-    return _returned(fresnel(cos_d, eta), 2 * cos_d * z - ci, ci, z, cos_d, m, distribution)
+    return _returned(conductor(cos_d, eta, 0.0), 2 * cos_d * z - ci, ci, z, cos_d, m, distribution)
 
 
-def transmittance(cos_i: Floats, eta: float, m: float = 0.0, distribution: str = "ggx") -> Floats:
+def transmittance(cos_i: Floats, eta: float, m: float = 0.0, distribution: Distribution = "ggx") -> Floats:
     """Share of the light from one direction that is transmitted, at cos_i (N,)."""
     if m == 0:
-        return 1 - fresnel(cos_i, eta)
+        return 1 - conductor(cos_i, eta, 0.0)
     ci, z, cos_d = _facets(cos_i, m, distribution)
     cos_t = np.sqrt(np.maximum(1 - (1 - cos_d**2) / eta**2, 0))
     cos_o = ci / eta - (cos_d / eta - cos_t) * z  # on the far side
-    return _returned(1 - fresnel(cos_d, eta), cos_o, ci, z, cos_d, m, distribution)
+    return _returned(1 - conductor(cos_d, eta, 0.0), cos_o, ci, z, cos_d, m, distribution)
 
 
 @cache
-def mean_reflectance(eta: float, m: float = 0.0, distribution: str = "ggx") -> float:
+def mean_reflectance(eta: float, m: float = 0.0, distribution: Distribution = "ggx") -> float:
     """Share of diffuse light that is reflected."""
     if m == 0 and eta < 1:  # inside a smooth surface: by reciprocity from outside
         return 1 - (1 - mean_reflectance(1 / eta)) * eta**2
@@ -57,7 +50,7 @@ def mean_reflectance(eta: float, m: float = 0.0, distribution: str = "ggx") -> f
 
 
 @cache
-def mean_transmittance(eta: float, m: float = 0.0, distribution: str = "ggx") -> float:
+def mean_transmittance(eta: float, m: float = 0.0, distribution: Distribution = "ggx") -> float:
     """Share of diffuse light that is transmitted."""
     return _mean(transmittance(COS, eta, m, distribution))
 
@@ -98,7 +91,7 @@ def _mean(values: Floats) -> float:
     return float(np.sum(GAUSS_WEIGHTS * COS * values))
 
 
-def _facets(cos_i: Floats, m: float, distribution: str) -> tuple[Floats, Floats, Floats]:
+def _facets(cos_i: Floats, m: float, distribution: Distribution) -> tuple[Floats, Floats, Floats]:
     """cos_i (N, 1), and for facets of density D cos the cosines to the surface's normal and to the light (N, K)."""
     u = (np.arange(FACETS) + 0.5) / FACETS
     r = np.sqrt(u / (1 - u)) if distribution == "ggx" else np.sqrt(-np.log(1 - u))
@@ -109,21 +102,16 @@ def _facets(cos_i: Floats, m: float, distribution: str) -> tuple[Floats, Floats,
 
 
 def _returned(
-    share: Floats, cos_o: Floats, ci: Floats, z: Floats, cos_d: Floats, m: float, distribution: str
+    share: Floats, cos_o: Floats, ci: Floats, z: Floats, cos_d: Floats, m: float, distribution: Distribution
 ) -> Floats:
     """Mean over facets of the light that leaves at cos_o without masking."""
     held = share * _unmasked(ci, m, distribution) * _unmasked(np.maximum(cos_o, 1e-6), m, distribution)
     return np.asarray(np.where(cos_o > 0, held * cos_d / (ci * z), 0.0).mean(axis=1))
 
 
-def _unmasked(cosine: Floats, m: float, distribution: str) -> Floats:
+def _unmasked(cosine: Floats, m: float, distribution: Distribution) -> Floats:
     """Share of facets that Smith's masking leaves visible."""
-    tangent = np.sqrt(np.maximum(1 - cosine**2, 0)) / cosine
-    if distribution == "ggx":
-        return np.asarray(2 / (1 + np.sqrt(1 + (m * tangent) ** 2)))
-    a = 1 / np.maximum(m * tangent, 1e-6)
-    fitted = (3.535 * a + 2.181 * a**2) / (1 + 2.276 * a + 2.577 * a**2)
-    return np.where(a < 1.6, fitted, 1.0)
+    return np.asarray(1 / (1 + smith_lambda(m**2 * (1 - cosine**2).clip(0) / cosine**2, distribution)))
 
 
 # fmt: off
