@@ -11,8 +11,9 @@ from lambent.core.discovery import known
 
 
 class QualityName(StrEnum):
-    """Qualities for which every kind of artefact has settings."""
+    """Qualities; every kind of artefact has settings for each, but a draft changes those of a preview."""
 
+    draft = "draft"
     preview = "preview"
     normal = "normal"
     final = "final"
@@ -39,8 +40,17 @@ class Quality:
         return replace(by_quality[self.base], **self.changes.get(kind, {}))
 
 
+DRAFT = Quality(QualityName.draft).changed(
+    geometry={"texels": 192},
+    light_map={"samples": (16, 16), "noise": 0.5, "max_depth": 6, "gather_samples": 64},
+    environment={"texels": 128},
+    probe={"texels": 64, "samples": 8},
+)
+
+
 def quality_named(name: str | Quality) -> Quality:
     """The quality of this name; a `Quality` is returned unchanged."""
     if isinstance(name, Quality):
         return name
-    return Quality(name, QualityName(known("quality", name, list(QualityName))))
+    found = QualityName(known("quality", name, list(QualityName)))
+    return DRAFT if found is QualityName.draft else Quality(name, found)

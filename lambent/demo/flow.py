@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from lambent.baking.bake import bake
-from lambent.baking.quality import Quality, quality_named
+from lambent.baking.quality import DRAFT, Quality, quality_named
 from lambent.baking.reference.goniophotometer import measure
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
@@ -80,13 +80,6 @@ class Effort:
 
 
 FIRST = 640, 400  # pixels of the first picture
-DRAFT = quality_named("preview").changed(
-    "draft",
-    geometry={"texels": 192},
-    light_map={"samples": (16, 16), "noise": 0.5, "max_depth": 6, "gather_samples": 64},
-    environment={"texels": 128},
-    probe={"texels": 64, "samples": 8},
-)
 FULL = Effort(quality_named("preview"), None, (1680, 1050), (720, 450), 20, (840, 525), 48, 48)
 QUICK = Effort(DRAFT, 3_000, (960, 600), (480, 300), 10, (420, 262), 32, 24, 4)
 
