@@ -40,7 +40,7 @@ def test_without_blender_one_line_says_what_to_install(file: Path, monkeypatch: 
     found = blender.find_spec
     monkeypatch.setenv("PATH", "")
     monkeypatch.setattr(blender, "find_spec", lambda name: None if name == "bpy" else found(name))
-    with pytest.raises(UserError, match=r"needs Blender to be read.*`pip install bpy`; or export glTF"):
+    with pytest.raises(UserError, match=r"needs Blender to be read.*`pip install --no-deps bpy`.*or export glTF"):
         load_scene(file)
 
 
