@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from lambent.api.tables import Fit as Fit
     from lambent.api.tables import Table as Table
     from lambent.api.views import View as View
+    from lambent.api.windows import window as window
     from lambent.core.errors import UserError as UserError
 
 __version__ = "0.1.0"
@@ -39,7 +40,7 @@ _MODULES = {
     "Picture": "api.pictures", "Scene": "api.scenes", "Store": "api.stores", "Table": "api.tables",
     "UserError": "core.errors", "View": "api.views", "bake": "api.bakes", "check": "api.checking",
     "compare": "api.pictures", "convert": "api.converting", "glare": "api.glare", "open": "api.reading",
-    "propose": "api.bakes", "read": "api.reading",
+    "propose": "api.bakes", "read": "api.reading", "window": "api.windows",
 }  # fmt: skip
 __all__ = ["__version__", *_MODULES]
 

@@ -47,10 +47,10 @@ def command(
             if given:
                 raise UserError("is for a picture", field=f"--{name}", hint="name it with -o")
         pixels = parse_size(size)
-        from lambent.viewer import app
+        from lambent.api.windows import window
 
         sky = None if environment is None else {"path": environment, "layout": layout, "up": up, "scale": scale}
-        app.run(store, "relight", size=pixels, camera=camera, environment=sky, turn_deg=turn)
+        window(store, "relight", size=pixels, camera=camera, environment=sky, turn_deg=turn)
         return
     from dataclasses import replace
 

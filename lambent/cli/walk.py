@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -34,14 +34,14 @@ def command(
 
 
 def show(
-    store: Path, mode: str, size: str, light_field_mb: float | None, policy: str, sky_turn_deg: float,
-    replace: list[str] | None, fresh: bool,
+    store: Path, mode: Literal["walk", "view"], size: str, light_field_mb: float | None, policy: str,
+    sky_turn_deg: float, replace: list[str] | None, fresh: bool,
 ) -> None:  # fmt: skip
     """Open the window on a store."""
     pixels = parse_size(size)
-    from lambent.viewer import app
+    from lambent.api.windows import window
 
-    app.run(
+    window(
         store, mode, size=pixels, light_field_mb=light_field_mb, policy=policy, sky_turn_deg=sky_turn_deg,
         replaced=tuple(replace or ()), fresh=fresh,
     )  # fmt: skip

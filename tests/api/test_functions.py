@@ -68,3 +68,16 @@ def test_a_room_as_its_window_left_it(adapter, baked_box, tmp_path):
     size = {"size": (48, 36), "integrator": "lamps"}
     left, edited = store.as_left(**size), store.render("front", edits={"red": lambent.Material(blue)}, **size)
     np.testing.assert_allclose(left.radiance, edited.radiance, rtol=1e-2, atol=1e-3)
+
+
+def test_a_window_needs_something_to_show(monkeypatch, tmp_path):
+    monkeypatch.setattr("lambent.viewer.app.run", lambda *given, **options: shown.append((*given, options)))
+    shown = []
+    (tmp_path / "manifest.json").write_text('{"format": "none"}')
+    lambent.window(tmp_path, "view", size=(320, 200), fresh=True)
+    assert shown == [(tmp_path, "view", {"size": (320, 200), "fresh": True})]
+    with pytest.raises(lambent.UserError, match="is shown from its file"):
+        lambent.window(lambent.Material(BRIGHT))
+    monkeypatch.undo()
+    with pytest.raises(lambent.UserError, match="unknown mode.*walk"):
+        lambent.window(tmp_path, "wlak")

@@ -29,6 +29,7 @@ glare(what, camera, *, threshold_cd_m2, note, progress, **settings)
 open(folder)
 propose(scene, *, views, session, interreflection, store, progress)
 read(file, *, reconstruction, crease_deg)
+window(what, mode, *, size, **options)
 Comparison.flip
 Comparison.psnr_db
 Fit.errors

@@ -44,9 +44,9 @@ def command(
     Example: lambent edit brushed.bsdf brushed.json --environment studio.hdr
     """
     pixels, resolution = parse_size(size), parse_size(picture, "--picture") if picture else None
-    from lambent.viewer import edit
+    from lambent.api.windows import window
 
-    edit.run(
-        what, material, environment or (), camera=camera, picture=resolution, store=output, crease_deg=crease_angle,
-        size=pixels,
+    window(
+        what, "edit", material=material, environments=environment or (), camera=camera, picture=resolution,
+        store=output, crease_deg=crease_angle, size=pixels,
     )  # fmt: skip
