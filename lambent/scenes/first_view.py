@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lambent.core.arrays import Flags, Floats
+from lambent.core.geometry.triangles import area_vectors, ray_distances, triangle_areas
 from lambent.core.plain import triple
 from lambent.core.views.camera import Camera, overview
 from lambent.scenes.mesh import boxes_of, corners_of
@@ -104,30 +105,18 @@ class _Walls:
     def __init__(self, objects: Sequence[SceneObject]) -> None:
         corners = corners_of([o.mesh for o in objects])
         of_object = np.repeat(np.arange(len(objects)), [len(o.mesh.faces) for o in objects])
-        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-        largest = np.argsort(area)[-MOST_TRIANGLES:]
-        largest = largest[area[largest] > 0]
-        self._object, self._a = of_object[largest], corners[largest, 0]
-        self._u, self._v = (corners[largest, k] - self._a for k in (1, 2))
-        self._n = np.cross(self._u, self._v)
+        largest = np.argsort(triangle_areas(corners))[-MOST_TRIANGLES:]
+        self._object, self._corners = of_object[largest], corners[largest].astype(float)
 
     def hit(self, origins: Floats, directions: Floats) -> tuple[Floats, Flags, Floats]:
-        """Distance (R,) of each ray's first triangle, inf without a hit, whether it is a front, and its object, or -1.
-
-        Moeller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", 1997.
-        """
+        """Distance (R,) of each ray's first triangle, inf without one, whether it is a front, and its object, or -1."""
         found = np.full(len(origins), np.inf), np.zeros(len(origins), bool), np.full(len(origins), -1)
         for ray, (origin, w) in enumerate(zip(origins, directions, strict=True)):
-            facing = self._n @ w
-            with np.errstate(divide="ignore", invalid="ignore"):
-                to_a = self._a - origin
-                across = np.cross(w, to_a)
-                t = np.einsum("tc,tc->t", self._n, to_a) / facing
-                u, v = (k * np.einsum("tc,tc->t", e, across) / facing for k, e in ((-1, self._v), (1, self._u)))
-                inside = (t > 1e-6) & (u >= 0) & (v >= 0) & (u + v <= 1)
-            if inside.any():
-                first = np.flatnonzero(inside)[t[inside].argmin()]
-                for values, value in zip(found, (t[first], facing[first] < 0, self._object[first]), strict=True):
+            distance = ray_distances(origin, w, self._corners)
+            first = distance.argmin()
+            if np.isfinite(distance[first]):
+                is_front = area_vectors(self._corners[first]) @ w < 0
+                for values, value in zip(found, (distance[first], is_front, self._object[first]), strict=True):
                     values[ray] = value
         return found
 

@@ -1,4 +1,4 @@
-"""Triangles: normals, areas, random points. Arrays of corners (..., 3, 3): triangle, corner, coordinate."""
+"""Triangles: normals, areas, random points, rays. Arrays of corners (..., 3, 3): triangle, corner, coordinate."""
 
 from __future__ import annotations
 
@@ -40,3 +40,17 @@ def points_on_triangles(corners: Floats, face: NDArray[np.integer], rng: np.rand
 def cross_2d(u: Floats, v: Floats) -> Floats:
     """Cross product (...) of plane vectors (..., 2): positive where v lies counter-clockwise of u."""
     return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])
+
+
+def ray_distances(origin: Floats, direction: Floats, triangles: Floats) -> Floats:
+    """Distances (T,), m, to triangles (T, 3, 3), on either side; inf for a miss (Moller & Trumbore 1997)."""
+    edge1, edge2, s = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0], origin - triangles[:, 0]
+    across = -np.cross(np.eye(3), direction)  # by which a vector becomes direction x vector
+    p = edge2 @ across
+    det = np.einsum("tc,tc->t", edge1, p)
+    flat = np.abs(det) < 1e-20
+    inverse = 1 / np.where(flat, 1, det)
+    u, v = (np.einsum("tc,tc->t", *pair) * inverse for pair in ((s, p), (edge1, s @ across)))
+    t = np.einsum("tc,tc->t", edge2, np.cross(s, edge1)) * inverse
+    hit = ~flat & (u >= -1e-6) & (v >= -1e-6) & (u + v <= 1 + 1e-6) & (t > 1e-6)
+    return np.where(hit, t, np.inf)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lambent.core.arrays import Floats
+from lambent.core.geometry.triangles import ray_distances
 from lambent.store.contract import ObjectRecord
 
 
@@ -45,23 +46,7 @@ class Geometry:
 
 def first_hit(origin: Floats, direction: Floats, triangles: Floats) -> float:
     """Distance to the nearest of triangles (T, 3, 3), on either side; inf for none."""
-    return float(hits(origin, direction, triangles).min(initial=math.inf))
-
-
-def hits(origin: Floats, direction: Floats, triangles: Floats) -> Floats:
-    """Distances (T,), m, to triangles (T, 3, 3), on either side; inf for a miss (Moller & Trumbore 1997)."""
-    edge1, edge2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    p = np.cross(direction, edge2)
-    det = np.sum(edge1 * p, axis=-1)
-    flat = np.abs(det) < 1e-20
-    inverse = 1 / np.where(flat, 1, det)
-    s = origin - triangles[:, 0]
-    u = np.sum(s * p, axis=-1) * inverse
-    q = np.cross(s, edge1)
-    v = np.sum(direction * q, axis=-1) * inverse
-    t = np.sum(edge2 * q, axis=-1) * inverse
-    hit = ~flat & (u >= -1e-6) & (v >= -1e-6) & (u + v <= 1 + 1e-6) & (t > 1e-6)
-    return np.where(hit, t, np.inf)
+    return float(ray_distances(origin, direction, triangles).min(initial=math.inf))
 
 
 def _box_entry(origin: Floats, direction: Floats, box: Floats) -> float:

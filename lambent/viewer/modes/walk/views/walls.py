@@ -12,10 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.geometry.triangles import area_vectors
+from lambent.core.geometry.triangles import area_vectors, ray_distances
 from lambent.core.plain import Triple
 from lambent.viewer.cameras.cameras import NEAREST_M, WALL_M, Bounds, is_within, way_out_m
-from lambent.viewer.cameras.picking import first_hit, hits
+from lambent.viewer.cameras.picking import first_hit
 
 STEP_M = 0.35  # a floor higher above the feet than this is a table, not a stair
 BODY_M = 0.22
@@ -73,7 +73,7 @@ class Walls:
         low, high = np.minimum(start, start + step), np.maximum(start, start + step)
         near = np.flatnonzero(np.all((self._low <= high) & (self._high >= low), axis=1))
         if len(near):
-            t = hits(start, step, self._triangles[near])
+            t = ray_distances(start, step, self._triangles[near])
             nearest = near[np.argmin(t)]
             if t.min() <= 1:
                 corner, normal = self._triangles[nearest, 0], self._normals[nearest]
