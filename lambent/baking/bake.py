@@ -18,6 +18,7 @@ from typing import cast
 
 from lambent.baking import artefacts
 from lambent.baking.context import Artefact, BakeContext
+from lambent.baking.engine import engine
 from lambent.baking.interreflection.settings import Bounces
 from lambent.baking.light_fields import request
 from lambent.baking.methods import METHODS, check_groups, chosen
@@ -161,6 +162,7 @@ def bake(
         for kind in order:
             if context.stale(kind):
                 with timed(kind, continued=bool(context.begun(kind))):
+                    engine()  # before an artefact imports Mitsuba
                     kinds[kind].bake(context)
             context.watch.arrived(kind, context.keys(kind).keys())
             if describe := getattr(kinds[kind], "describe", None):

@@ -6,7 +6,7 @@ A kind of artefact is a module of `artefacts/`, found by its file:
     NEEDS = ("geometry",)        kinds whose arrays it reads, baked before it
     SETTINGS = {...}             optional: a dataclass for each QualityName
     def keys(context)            {array name: key} of every array it writes, including samples kept for a later bake
-    def bake(context)            writes the stale arrays
+    def bake(context)            writes the stale arrays; imports Mitsuba, whose engine is chosen by then, only here
     OF_VIEWS = True              optional: nothing is baked without views
     ON_REQUEST = True            optional: baked only if requested by name
     def describe(context)        optional: writes documents, which have no keys; called by every bake

@@ -22,7 +22,6 @@ from lambent.baking.artefacts.light_map import (
 )
 from lambent.baking.artefacts.probe import sharing
 from lambent.baking.context import BakeContext
-from lambent.baking.engine import engine
 from lambent.baking.methods import sorts_light
 from lambent.baking.quality import QualityName
 from lambent.baking.running.keys import key_of
@@ -102,7 +101,6 @@ def _by_group(name: str) -> str:
 
 
 def bake(context: BakeContext) -> None:
-    engine()  # before Mitsuba is imported
     from lambent.baking.answering.rays import RayEnds
 
     stale = context.stale(KIND)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lambent.baking.context import BakeContext
-from lambent.baking.engine import engine
 from lambent.baking.quality import QualityName
 from lambent.baking.running.keys import environment_inputs, key_of
 from lambent.core.light.colour import in_halves
@@ -34,8 +33,6 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 def bake(context: BakeContext) -> None:
     environment = context.scene.environment
-    if environment:
-        engine()  # before Mitsuba is imported
     from lambent.baking.sky.cube import environment_cube
 
     context.progress(0, 1, "environment")

@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 
 from lambent.baking.context import GEOMETRY, BakeContext
-from lambent.baking.engine import engine
 from lambent.baking.quality import QualityName
 from lambent.baking.running.keys import geometry_inputs, key_of
 from lambent.baking.surfaces.atlas import merged, object_records, unwrap
@@ -42,7 +41,6 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 
 def bake(context: BakeContext) -> None:
-    engine()  # before Mitsuba is imported
     from lambent.baking.tracing.seen.viewed import texel_sizes
 
     texels, longest_m = context.settings(KIND).texels, longest_piece(context.store)

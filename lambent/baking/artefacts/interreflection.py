@@ -14,7 +14,6 @@ import numpy as np
 
 from lambent.baking.artefacts.view_points import points_key
 from lambent.baking.context import BakeContext
-from lambent.baking.engine import engine
 from lambent.baking.interreflection.as_baked import SCATTERING_TEXTURES, shapes_of, state_of
 from lambent.baking.interreflection.series import Bins, bins_of, tails_of, used_materials
 from lambent.baking.interreflection.tiles import Job, Tile, TileTracer
@@ -62,7 +61,6 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 
 def bake(context: BakeContext) -> None:
-    engine()  # before Mitsuba is imported
     bounces, editables, scene = context.bounces, _editables(context), context.in_views
     tails, bins = tails_of(editables, bounces), bins_of(editables, bounces)
     work = TileTracer(scene, tails, bins, context.seed, context.view_tracer, bounces.diffuse_seen)

@@ -9,7 +9,6 @@ from scipy.ndimage import maximum_filter
 
 from lambent.baking.artefacts.light_map import IRRADIANCE, SIGNS, lamps_apart, side_count
 from lambent.baking.context import BakeContext
-from lambent.baking.engine import engine
 from lambent.baking.methods import sorts_light
 from lambent.baking.running.keys import key_of
 from lambent.core.plain import triple
@@ -32,7 +31,6 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 
 def bake(context: BakeContext) -> None:
-    engine()  # before Mitsuba is imported
     from lambent.baking.light.lamp_maps import shadow_map
 
     traced, scene = context.traced, context.scene

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lambent.baking.context import BakeContext
-from lambent.baking.engine import engine
 from lambent.baking.methods import LightMapMethod, sorts_light
 from lambent.baking.quality import QualityName
 from lambent.baking.running.keys import group_inputs, key_of, light_inputs, material_inputs
@@ -113,7 +112,6 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 
 def bake(context: BakeContext) -> None:
-    engine()  # before Mitsuba is imported
     stale = context.stale(KIND)
     if stale - {DOMINANT_DIRECTION, MOMENTS, *NOISE}:
         if sorts_light(context.methods):

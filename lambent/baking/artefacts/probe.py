@@ -85,7 +85,6 @@ def bake(context: BakeContext) -> None:
     missing = [name for name in _objects(context) if stale & {probe_name(name, part) for part in parts}]
     context.store.forget(probe_name(name, part) for name in owners for part in (*PARTS, GROUPS))
     context.watch.arrived(KIND, context.keys(KIND).keys() - stale)
-    engine()  # before Mitsuba is imported
     from lambent.baking.probes.probe_set import ProbeSet
 
     front, back = finished_maps(context)

@@ -9,7 +9,6 @@ import numpy as np
 
 from lambent.baking.artefacts.light_map import finished_maps, lamps_apart
 from lambent.baking.context import BakeContext
-from lambent.baking.engine import engine
 from lambent.baking.running.keys import key_of
 from lambent.baking.running.tiles import seed_of
 from lambent.core.light.colour import luminance
@@ -31,7 +30,6 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 
 def bake(context: BakeContext) -> None:
-    engine()  # before Mitsuba is imported
     from lambent.baking.probes.shares import ShareTracer
 
     traced, maps = context.traced, finished_maps(context)

@@ -11,7 +11,6 @@ import numpy as np
 from lambent.baking.artefacts.transport import ENTRIES, append
 from lambent.baking.artefacts.view_points import points_key
 from lambent.baking.context import BakeContext
-from lambent.baking.engine import engine
 from lambent.baking.quality import QualityName
 from lambent.baking.running.keys import environment_inputs, key_of, light_inputs, material_inputs
 from lambent.baking.running.tiles import seed_of
@@ -74,7 +73,6 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 
 def bake(context: BakeContext) -> None:
-    engine()  # before Mitsuba is imported
     from lambent.scenes.sky.triangle_wavelets import PARTS, ROWS_OF_PARTS, TriangleTree, TurningLight
 
     tree = TriangleTree(context.settings(KIND).depth)

@@ -6,7 +6,6 @@ import numpy as np
 
 from lambent.baking.artefacts.light_map import may_have_sun
 from lambent.baking.context import BakeContext
-from lambent.baking.engine import engine
 from lambent.baking.running.keys import key_of
 from lambent.store.sunlit import GEOMETRY, SUNLIT
 
@@ -22,7 +21,6 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 
 def bake(context: BakeContext) -> None:
-    engine()  # before Mitsuba is imported
     from lambent.baking.light.sunlit import sunlit
     from lambent.baking.tracing.lights.sun import SunRays
 

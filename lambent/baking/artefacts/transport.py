@@ -11,7 +11,6 @@ import numpy as np
 
 from lambent.baking.artefacts.visibility import lights_key, trace
 from lambent.baking.context import BakeContext
-from lambent.baking.engine import engine
 from lambent.baking.interreflection.series import SMOOTH_ANGLES
 from lambent.baking.quality import QualityName
 from lambent.baking.running.in_background import background
@@ -94,7 +93,6 @@ def keys(context: BakeContext) -> dict[str, str]:
 
 
 def bake(context: BakeContext) -> None:
-    engine()  # before Mitsuba is imported
     counts = context.settings("visibility").lights
     for count in counts:
         for view in context.views:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from lambent.baking.context import BakeContext
-from lambent.baking.engine import engine
 from lambent.baking.running.keys import geometry_inputs, key_of, light_inputs, texture_inputs
 from lambent.baking.transport.view import View
 from lambent.core.plain import triple
@@ -52,7 +51,6 @@ def describe(context: BakeContext) -> None:
 
 
 def bake(context: BakeContext) -> None:
-    engine()  # before Mitsuba is imported
     objects = [[o.name, o.material] for o in context.in_views.objects]
     for i, view in enumerate(context.views):
         context.progress(i, len(context.views), f"view {view.camera.name}")

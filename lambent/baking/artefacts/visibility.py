@@ -8,7 +8,6 @@ import numpy as np
 
 from lambent.baking.artefacts.view_points import points_key
 from lambent.baking.context import BakeContext
-from lambent.baking.engine import engine
 from lambent.baking.quality import QualityName
 from lambent.baking.running.keys import key_of, light_inputs
 from lambent.baking.running.tiles import run_tiles
@@ -60,7 +59,6 @@ def bake(context: BakeContext) -> None:
 
 def trace(context: BakeContext, view: View, count: int) -> None:
     """Continue the visibility of this many lights until it is complete."""
-    engine()  # before Mitsuba is imported
     from lambent.baking.transport.visibility import BITS, visibility
 
     name = view.name(KIND, str(count))
