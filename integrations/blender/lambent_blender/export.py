@@ -11,7 +11,7 @@ import bpy
 from .assigned import material_notes, materials_of
 from .cameras import cameras_of, paths_of
 from .files import Copies, missing_files
-from .geometry import LOST, SOLID, Named, escaped, renderable, write_glb
+from .geometry import LOST, SOLID, Named, as_rendered, escaped, renderable, write_glb
 from .lamps import FACE, Lamps
 from .properties import WISHES, setting
 from .surroundings import environment_of
@@ -51,7 +51,8 @@ def export_scene(folder, name, context=None):
     notes = []
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        document = _document(scene, view_layer, shown, target.parent, name, notes.append)
+        with as_rendered(scene, view_layer, shown):
+            document = _document(scene, view_layer, shown, target.parent, name, notes.append)
         target.write_text(f"{MARK}\n{toml_of(document)}", "utf-8")
     except OSError as error:
         raise ExportError(f"{target.parent} cannot be written ({error.strerror})") from error
@@ -61,9 +62,7 @@ def export_scene(folder, name, context=None):
 def _document(scene, view_layer, shown, folder, name, note):
     frame, copies = Frame(scene), Copies(folder, note)
     geometry, depsgraph = folder / f"{name}.glb", view_layer.depsgraph
-    view_layer.update()
-    write_glb(geometry, scene, view_layer)
-    named = Named(geometry)
+    named = Named(write_glb(geometry))
     if not named.objects:
         raise ExportError(f"scene {scene.name} has nothing to export: its meshes have no faces")
     lamps = _lamps(shown, depsgraph, named, Lamps(frame, copies, note))
@@ -100,7 +99,7 @@ def _lamps(shown, depsgraph, named, lamps):
     for o, matrix in placed:
         if o.hide_render or getattr(getattr(o.data, "cycles", None), "is_portal", False):
             continue
-        name = _free(" ".join("".join(c if c.isprintable() and c != "#" else " " for c in o.name).split()), taken)
+        name = _free(" ".join("".join(c if c.isprintable() and c not in "#\\" else " " for c in o.name).split()), taken)
         lamps.names.setdefault(o.name_full, []).append(name)
         lamps.add(name, o.data, matrix)
     lamps.finish()

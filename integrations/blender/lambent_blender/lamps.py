@@ -94,10 +94,10 @@ class Lamps:
         if area_m2 < 1e-12:
             self.note(f"light {name}: left out, it has no area")
             return
-        self.obj += [f"o {name}", *("v {:.9g} {:.9g} {:.9g}".format(*corner) for corner in corners)]
+        self.obj += [f"o {name}", f"usemtl {FACE}", *("v {:.9g} {:.9g} {:.9g}".format(*corner) for corner in corners)]
         self.obj += ["vt 0 0", "vn {:.9g} {:.9g} {:.9g}".format(*ahead)]
         self.obj.append("f " + " ".join(f"{i - len(corners)}/-1/-1" for i in range(len(corners))))
-        self.objects[escaped(name)] = {"material": FACE, "emission": [w / (math.pi * area_m2) for w in watts]}
+        self.objects[escaped(name)] = {"emission": [w / (math.pi * area_m2) for w in watts]}
 
 
 def luminance(colour):
