@@ -126,9 +126,7 @@ def usual_level(looks: Iterable[Watched]) -> float:
         return 1.0
     light = np.concatenate([luminance(one.light) for one in seen])
     weight = np.concatenate([np.full(len(one.x), one.size_sr / len(one.x)) for one in seen])
-    order = np.argsort(light)
-    total = np.cumsum(weight[order])
-    return max(float(light[order][np.searchsorted(total, total[-1] / 2)]), 1e-6)
+    return max(float(np.quantile(light, 0.5, weights=weight, method="inverted_cdf")), 1e-6)
 
 
 def shown_by_reflectors(scene: Scene, store: Store) -> dict[str, float]:

@@ -103,9 +103,8 @@ def sun_in(picture: Image, turn: Floats) -> FoundSun | None:
         return None
     w, flux = _directions(row, column, height, width), light[row, column]
     reach = _angles(w, normalize(flux @ w))
-    order = np.argsort(reach)
-    half = reach[order][np.searchsorted(np.cumsum(flux[order]), flux.sum() / 2)]
-    limit = HALO * max(float(half), np.pi / height)
+    half = float(np.quantile(reach, 0.5, weights=flux, method="inverted_cdf"))
+    limit = HALO * max(half, np.pi / height)
     row, column, w, flux = (values[reach <= limit] for values in (row, column, w, flux))
     about = normalize(flux @ w)
     added = np.maximum(picture[row, column] - _behind(picture, row, column, about), 0).astype(np.float32)

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import basis, normalize
@@ -106,9 +105,12 @@ def _seen(corners: Floats, eyes: Floats, axes: Floats) -> tuple[Floats, Floats]:
     face = rng.choice(len(area), size=POINTS, p=share)
     points = points_on_triangles(cut, face, rng)
     weight = area[face] / share[face] / _distances(points, eyes) ** 3
-    bounds = np.array([_quantiles(values, weight) for values in (points @ axes.T).T])
+    ends = (1 - MIDDLE) / 2, (1 + MIDDLE) / 2
+    low, high = np.transpose(
+        [np.quantile(at, ends, weights=weight, method="inverted_cdf") for at in (points @ axes.T).T]
+    )
     own = eyes @ axes.T
-    return np.minimum(bounds[:, 0], own.min(axis=0)), np.maximum(bounds[:, 1], own.max(axis=0))
+    return np.minimum(low, own.min(axis=0)), np.maximum(high, own.max(axis=0))
 
 
 def _cut_about(eyes: Floats, corners: Floats) -> Floats:
@@ -135,12 +137,6 @@ def _cut_about(eyes: Floats, corners: Floats) -> Floats:
 
 def _distances(points: Floats, eyes: Floats) -> Floats:
     """Distances (n,) of points (n, 3) from the nearest eye, at least 1 m."""
+    from scipy.spatial import cKDTree
+
     return np.asarray(np.maximum(cKDTree(eyes).query(points)[0], 1.0))
-
-
-def _quantiles(values: Floats, weight: Floats) -> tuple[float, float]:
-    """What lies between holds MIDDLE of the weight."""
-    order = np.argsort(values)
-    up_to = np.cumsum(weight[order]) / weight.sum()
-    low, high = np.searchsorted(up_to, [(1 - MIDDLE) / 2, (1 + MIDDLE) / 2])
-    return float(values[order[low]]), float(values[order[min(high, len(order) - 1)]])
