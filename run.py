@@ -25,6 +25,7 @@ PYTHON = VENV / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 STAMP = VENV / "lambent-ready.json"
 PYTHONS = ((3, 11), (3, 12), (3, 13))  # those that every dependency has ready-made packages for
 BLENDER = "bpy==5.0.1"  # Blender as a package, for Python 3.11; tests that need it skip where it is not
+BLENDER_PACKAGES = ["libsm6", "libgl1", "libxfixes3", "libxi6", "libxkbcommon0", "libxrender1"]  # that it loads
 VALIDATOR = "gltf-validator@2.0.0-dev.3.10"  # of npm, without dependencies; tests that need it skip where it is not
 WINDOW_TEST_PACKAGES = {"Xvfb": "xvfb", "xdotool": "xdotool"}
 
@@ -156,6 +157,8 @@ def install_blender():
     pip = [PYTHON, "-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--quiet", "--no-deps"]
     if subprocess.call([*pip, BLENDER]) != 0:
         say(f"pip could not install {BLENDER}; the tests that need it will skip")
+    elif not works([PYTHON, "-c", "import bpy"]):
+        apt_install(BLENDER_PACKAGES)
 
 
 def install_system_parts(for_tests):
