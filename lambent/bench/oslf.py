@@ -22,13 +22,14 @@ from lambent.baked.light_fields import lookup as look
 from lambent.baked.light_fields.blocks.blocks import in_blocks
 from lambent.baked.light_fields.light_field import NO_POINT, LightField, Sky
 from lambent.baked.light_fields.lookup import March, Place
+from lambent.baked.light_fields.map_cache import POLICIES, misses
 from lambent.baked.light_fields.maps import radiance_along
 from lambent.baking.quality import Quality
-from lambent.bench.measuring.light_field_caches import caches
 from lambent.bench.scenes.light_field_view import Compared, LightFieldView
 from lambent.core.arrays import Floats
 from lambent.core.progress import Progress, part_of, silent
 from lambent.published.distance_impostors import fixed_point
+from lambent.published.map_reads import fewest_misses, thesis_reads
 from lambent.published.surface_light_fields import Basis, basis_weights, surface
 from lambent.scenes.loaders.load import load_scene
 
@@ -37,6 +38,8 @@ POWERS = (1, 4, 8, 16)
 STORED = ("B_n 4", "march 1", "march 1, sky", "march 4", "march 4, sky")  # methods also measured with stored blocks
 ONE, FOUR = March(candidates=1), March()
 PER_POINT = FOUR.steps + 1 + FOUR.secants + 1  # reads of distances, including the one at infinity, plus the radiance
+SCATTERED = 100  # samples of a BRDF, for caches
+TILE = 16  # pixels: a renderer's order of shading
 PREVIEW = Quality("preview")
 SMALL = PREVIEW.changed("small", geometry={"texels": 64}, light_map={"gather_samples": 0}, environment={"texels": 16})
 
@@ -179,3 +182,36 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
         f"{row['reads']}, {row['order']}, {row['maps']}": row["miss_percent"]["least-recent"] for row in cached
     }
     return found
+
+
+def caches(
+    field: LightField, place: Place, view: LightFieldView, capacities: tuple[int, ...]
+) -> Iterator[dict[str, Any]]:
+    """Misses in percent of reads, pixel by pixel: in rows, as the thesis's renderer shades, or in tiles.
+
+    Maps are read whole: for the surface (the first point), for reflections (all four), and for SCATTERED samples of a
+    BRDF with the points in the outer loop, which reads each map that often in a row. The sample map is read by rows.
+    """
+    pixel, first = np.unique(view.shown.pixel, return_index=True)
+    row, column = np.divmod(pixel, view.size[0])
+    across = column // TILE
+    orders = {"rows": np.lexsort((column, row)), "tiles": np.lexsort((column, row, across, row // TILE))}
+    sample_rows = np.floor(view.shown.uv2[first, 1:] * field.grid[0]).astype(np.int64)
+    points = place.points[first]
+    for what, of, again in (
+        ("sample map", sample_rows, 1), ("surface", points[:, :1], 1), ("reflection", points, 1),
+        ("BRDF", points, SCATTERED),
+    ):  # fmt: skip
+        for order, pixels in orders.items():
+            wanted = of[pixels]
+            reads = wanted[wanted != NO_POINT].tolist()
+            for capacity in capacities:
+                missed = {name: misses(reads, make(capacity)) for name, make in POLICIES.items()}
+                missed["known future"] = fewest_misses(reads, capacity)
+                percent = {name: round(100 * found / (len(reads) * again), 4) for name, found in missed.items()}
+                count = len(reads) * again
+                yield {
+                    "reads": what, "order": order, "maps": capacity, "count": count, "first": len(set(reads)),
+                    "miss_percent": percent,
+                }  # fmt: skip
+    yield from thesis_reads(Place(place.x[first], place.n[first], points), view.shown.w[first], orders, capacities)
