@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from lambent.api.bakes import Interreflection as Interreflection
     from lambent.api.bakes import bake as bake
     from lambent.api.bakes import propose as propose
+    from lambent.api.benches import run_bench as run_bench
     from lambent.api.checking import check as check
     from lambent.api.converting import convert as convert
     from lambent.api.glare import glare as glare
@@ -40,7 +41,8 @@ _MODULES = {
     "Picture": "api.pictures", "Scene": "api.scenes", "Store": "api.stores", "Table": "api.tables",
     "UserError": "core.errors", "View": "api.views", "bake": "api.bakes", "check": "api.checking",
     "compare": "api.pictures", "convert": "api.converting", "glare": "api.glare", "open": "api.reading",
-    "propose": "api.bakes", "read": "api.reading", "window": "api.windows",
+    "propose": "api.bakes", "read": "api.reading", "run_bench": "api.benches",
+    "window": "api.windows",
 }  # fmt: skip
 __all__ = ["__version__", *_MODULES]
 

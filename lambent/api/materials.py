@@ -9,6 +9,8 @@ import numpy as np
 
 from lambent.api.progress import Wanted, progress_of
 from lambent.core.arrays import Floats
+from lambent.core.discovery import known
+from lambent.core.errors import UserError
 from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Material as Document
@@ -60,6 +62,36 @@ class Material:
 
         with progress_of(progress) as bar:
             return Material(normalisation(self.document, seed, bar).after)
+
+    @property
+    def curves(self) -> dict[str, tuple[Floats, Floats]]:
+        """By title, each curve that can be pulled: angles (K,) in degrees, and values (K, C) there.
+
+        "highlight": brightness over theta_h, the angle of the half vector; "reflectance by angle": over theta_d, of
+        three channels; "diffuse by angle": over theta of either direction. Those of several lobes are numbered.
+        """
+        from lambent.editing.curves import nodes
+
+        one = self.document
+        return {name: (nodes.angles_deg(one, of), nodes.values_of(one, of)) for name, of in nodes.titled(one).items()}
+
+    def with_curve(self, title: str, values: Floats) -> Material:
+        """The material with other values (K, C) >= 0 of one of its `curves`; light at unchanged nodes stays.
+
+        Raises
+        ------
+        UserError
+            If there is no such curve, or the values are of another shape, negative, infinite or all 0.
+        """
+        from lambent.editing.curves import nodes
+
+        found = nodes.titled(self.document)
+        which, values = found[known("curve", title, found)], np.asarray(values, float)
+        shape = self.curves[title][1].shape
+        if values.shape != shape or not (np.isfinite(values).all() and (values >= 0).all() and values.any()):
+            expected = f"{shape} finite numbers from 0, not all 0"
+            raise UserError("cannot be taken", field=title, got=f"values of shape {values.shape}", expected=expected)
+        return Material(nodes.with_values(self.document, which, values))
 
     def save(self, file: str | Path) -> None:
         """Write the document (.json)."""

@@ -49,6 +49,10 @@ class UserError(Exception):
             parts.append(f"; {hint}")
         super().__init__(" ".join("".join(parts).splitlines()))
 
+    def _render_traceback_(self) -> list[str]:
+        """In a notebook, the line alone: IPython asks for this."""
+        return [f"UserError: {self}"]
+
 
 TABLE, LIST, NUMBER = "a table of keys and values", "a list", "a number"
 EXPECTED_TYPES = {

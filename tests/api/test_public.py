@@ -29,6 +29,7 @@ glare(what, camera, *, threshold_cd_m2, note, progress, **settings)
 open(folder)
 propose(scene, *, views, session, interreflection, store, progress)
 read(file, *, reconstruction, crease_deg)
+run_bench(name, *, quick, inputs, progress, **sizes)
 window(what, mode, *, size, **options)
 Comparison.flip
 Comparison.psnr_db
@@ -39,6 +40,7 @@ Fit.plots(self, folder, stem)
 Fit.report(self, file, *, environment, progress)
 Fit.warnings
 Material.albedo(self, wo, samples)
+Material.curves
 Material.eval(self, wi, wo)
 Material.facts(self)
 Material.name
@@ -48,6 +50,7 @@ Material.plot(self, file, title)
 Material.read(file)
 Material.sample(self, wo, u)
 Material.save(self, file)
+Material.with_curve(self, title, values)
 Picture.facts(self)
 Picture.read(file)
 Picture.save(self, file)

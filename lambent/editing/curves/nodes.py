@@ -39,6 +39,16 @@ def curves_of(material: Material) -> list[Which]:
     return [*found, *([Which("diffuse")] if any(material.kd) else [])]
 
 
+TITLES = {"shape": "highlight", "fresnel": "reflectance by angle", "diffuse": "diffuse by angle"}
+
+
+def titled(material: Material) -> dict[str, Which]:
+    """The curves by title; those of several lobes are numbered."""
+    many = len(material.lobes) > 1
+    numbers = (f" {which.lobe + 1}" if which.kind != "diffuse" and many else "" for which in curves_of(material))
+    return {TITLES[which.kind] + number: which for which, number in zip(curves_of(material), numbers, strict=True)}
+
+
 def angles_deg(material: Material, which: Which) -> Floats:
     """(K,) angles of the nodes: theta_h, theta_d, or theta of either direction; the last falls for the latter two."""
     if which.kind != "shape":

@@ -13,12 +13,14 @@ from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.editing.curves.nodes import (
     LEAST,
+    TITLES,
     Which,
     angles_deg,
     copied,
     curves_of,
     pulled,
     smoothed,
+    titled,
     values_of,
     with_lobe,
     with_values,
@@ -34,7 +36,6 @@ from lambent.viewer.screen import Screen
 Tool = Literal["pull", "pull softly", "draw"]
 TOOLS: tuple[Tool, ...] = get_args(Tool)
 CHANNELS = {"together": (0, 1, 2), "red": (0,), "green": (1,), "blue": (2,)}
-TITLES = {"shape": "highlight", "fresnel": "reflectance by angle", "diffuse": "diffuse by angle"}
 ANGLES = {"shape": "theta_h", "fresnel": "theta_d", "diffuse": "theta of light and eye"}
 TICKS_DEG = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 60.0, 85.0)
 HEIGHT_PX, NODE_PX, NEAR_PX = 190.0, 3.5, 18.0
@@ -68,7 +69,7 @@ class CurvesPanel:
             imgui.text_wrapped("Click an object in the picture.")
             return
         material = self.edits.current(name)
-        found = {_title(material, which): which for which in curves_of(material)}
+        found = titled(material)
         if not found:
             imgui.text_wrapped("Black: nothing to pull. Give the material a colour or a lobe first.")
             return
@@ -180,11 +181,6 @@ class CurvesPanel:
 
 
 MEANING = "highlight: brightness about the mirror direction; reflectance: Fresnel's rise to grazing; diffuse: the base"
-
-
-def _title(material: Material, which: Which) -> str:
-    of = f" {which.lobe + 1}" if which.kind != "diffuse" and len(material.lobes) > 1 else ""
-    return f"{TITLES[which.kind]}{of}"
 
 
 def _reset(material: Material, scene: Material, which: Which) -> Material:
