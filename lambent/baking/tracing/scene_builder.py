@@ -17,7 +17,7 @@ from lambent.baking.bsdfs.edited_plugin import edited_dict
 from lambent.baking.bsdfs.material_plugin import material_dict, register_material_plugin
 from lambent.baking.bsdfs.table_plugin import table_dict
 from lambent.baking.sky.daylight import sky_image
-from lambent.baking.tracing.lights.ies_emitter import ies_emitter
+from lambent.baking.tracing.lights.luminaire_emitters import ies_emitter
 from lambent.baking.tracing.shapes import UV2_ATTRIBUTE, ObjectNumbers, Shapes
 from lambent.core.arrays import Floats
 from lambent.materials.factored.terms import Editable

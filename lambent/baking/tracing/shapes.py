@@ -16,7 +16,7 @@ import mitsuba as mi
 import numpy as np
 
 from lambent.baking.bsdfs.material_plugin import TANGENT_ATTRIBUTE
-from lambent.baking.tracing.lights.opening_emitter import opening_emitter
+from lambent.baking.tracing.lights.luminaire_emitters import opening_emitter
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.scenes.geometry import merge, transformed
 from lambent.scenes.scene import IesLight, Scene, SceneObject
