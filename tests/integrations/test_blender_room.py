@@ -7,11 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from lambent.core.geometry.latlong import lat_long_directions
 from lambent.core.light.photometry import LM_PER_W
+from lambent.core.pictures.images import read_image
 from lambent.core.views.camera import clip_from_world
 from lambent.materials.document import Material
 from lambent.scenes.loaders.load import load_scene
-from lambent.scenes.scene import IesLight
+from lambent.scenes.scene import IesLight, ImageEnvironment
 from tests.integrations.blender_scenes.ies import write_constant
 
 CM = 0.01
@@ -100,11 +102,31 @@ def test_point_and_spot_have_watts_over_the_sphere(room):
 
 
 def test_a_sun_has_its_irradiance(room):
-    sun = lights_of(room[1])["sun"]
-    x, z = math.radians(40), math.radians(30)
-    down = np.array([-math.sin(z) * math.sin(x), math.cos(z) * math.sin(x), -math.cos(x)])  # about x, then about z
-    assert sun.irradiance == pytest.approx([3, 3, 3])
-    assert sun.direction == pytest.approx(UPRIGHT @ down, abs=1e-6)
+    sun = lights_of(room[1])["sharp sun"]
+    assert sun.irradiance == pytest.approx([2, 2, 2])
+    assert sun.direction == pytest.approx(UPRIGHT @ turned_down(10, 60), abs=1e-6)
+
+
+def turned_down(x_deg, z_deg):
+    """-z turned about x, then about z, in Blender's space."""
+    x, z = math.radians(x_deg), math.radians(z_deg)
+    return np.array([-math.sin(z) * math.sin(x), math.cos(z) * math.sin(x), -math.cos(x)])
+
+
+def test_a_soft_sun_is_a_disc_in_the_picture_of_the_world(room):
+    environment = room[1].environment
+    assert isinstance(environment, ImageEnvironment) and environment.rotation_deg == 0
+    picture = read_image(environment.file)[..., :3]
+    height, width = picture.shape[:2]
+    w = lat_long_directions(height, width)
+    solid_angle = (np.pi / height) ** 2 * np.sqrt(w[..., 0] ** 2 + w[..., 2] ** 2)
+    towards = -(UPRIGHT @ turned_down(40, 30))
+    cosine = w @ towards
+    irradiance = (picture * (solid_angle * np.maximum(cosine, 0))[..., None]).sum(axis=(0, 1))
+    assert irradiance == pytest.approx([3, 3, 3], rel=1e-3)
+    shines = picture[..., 0] > picture.max() / 2
+    assert np.degrees(np.arccos(cosine[shines].min())) == pytest.approx(math.degrees(0.1), abs=0.2)
+    assert solid_angle[shines].sum() == pytest.approx(2 * np.pi * (1 - math.cos(0.1)), rel=0.01)
 
 
 def test_area_lamps_emit_their_flux_downwards(room):
@@ -144,7 +166,7 @@ def test_materials_come_from_documents_images_and_principled_nodes(room):
     left, right = texels[:, 0].mean(axis=0), texels[:, -1].mean(axis=0)
     assert left[0] > left[2] and right[2] > right[0]
     assert scene.object("sign").emission == pytest.approx((3, 3, 3))
-    assert scene.exposure_ev == 1.5 and scene.environment is None
+    assert scene.exposure_ev == 1.5
 
 
 def test_a_flagged_collection_is_a_light_group(room):
@@ -155,7 +177,7 @@ def test_a_flagged_collection_is_a_light_group(room):
 def test_the_report_says_what_is_not_carried(room):
     said = "\n".join(room[1].warnings)
     for part in (
-        "light sun: its angle of 11.5 degrees", "light disc 1: its spread of 57.3 degrees",
+        "light disc 1: its spread of 57.3 degrees",
         "1 point and spot lights have a radius", "missing.json cannot be read (No such file or directory): it stays",
         "light follows the table tile.txt", "camera shifted: its shift", "camera plan: left out",
     ):  # fmt: skip

@@ -68,3 +68,14 @@ def test_the_camera_is_that_of_the_open_frame(terrace):
     truth, scene = terrace
     camera = next(c for c in scene.cameras if c.name == "Spaziergang")
     assert camera.position == pytest.approx(UPRIGHT @ truth["frames"]["13"][0] * INCH, abs=1e-5)
+
+
+def test_pictures_keep_their_light_in_every_state(blender, tmp_path):
+    """Floats are linear; bytes, on disk or not, are sRGB."""
+    found = blender("pictures", tmp_path)
+    assert found["files"].pop("missing") is None and found["notes"] == ["world: picture missing is missing: left out"]
+    assert len(set(found["files"].values())) == 6
+    for name, file in found["files"].items():
+        value = np.array([0.5, 0.25, 1.0])
+        linear = value if name == "floats" else ((value + 0.055) / 1.055) ** 2.4
+        assert read_image(tmp_path / file)[..., :3] == pytest.approx(np.broadcast_to(linear, (2, 4, 3)), abs=0.01), name

@@ -14,7 +14,7 @@ from .files import Copies, missing_files
 from .geometry import LOST, SOLID, Named, as_rendered, escaped, renderable, write_glb
 from .lamps import FACE, Lamps
 from .properties import WISHES, setting
-from .surroundings import environment_of
+from .surroundings import environment_of, with_sun
 from .toml_text import toml_of
 from .units import Frame
 
@@ -65,7 +65,11 @@ def _document(scene, view_layer, shown, folder, name, note):
     named = Named(write_glb(geometry))
     if not named.objects:
         raise ExportError(f"scene {scene.name} has nothing to export: its meshes have no faces")
-    lamps = _lamps(shown, depsgraph, named, Lamps(frame, copies, note))
+    world = environment_of(scene.world, copies, note)
+    plain = world is None or world["kind"] == "constant"
+    lamps = _lamps(shown, depsgraph, named, Lamps(frame, copies, note, plain))
+    if lamps.soft_sun is not None:
+        world = with_sun(world, *lamps.soft_sun, copies)
     for sentence in missing_files():
         note(sentence)
     for what in sorted({o.type for o in shown} & LOST):
@@ -80,7 +84,7 @@ def _document(scene, view_layer, shown, folder, name, note):
     objects = {**_light_fields(shown, named), **lamps.objects}
     found = {
         "format": "lambent-scene", "version": 1, "name": name, "geometry": files,
-        "exposure_ev": _exposure(scene, note), "environment": environment_of(scene.world, copies, note),
+        "exposure_ev": _exposure(scene, note), "environment": world,
         "materials": materials, "measured": measured, "objects": objects, "lights": lamps.lights,
         "light_groups": _light_groups(scene, named, lamps, note),
         "cameras": cameras_of(scene, frame, depsgraph, note), "paths": paths_of(scene, frame, depsgraph, note),

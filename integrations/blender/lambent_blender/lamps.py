@@ -18,7 +18,7 @@ from .units import Frame, behind, upright
 
 SIDES = 64  # of a disc
 FACE = "lamp face"  # material of area lamps
-REAL_SUN_RAD = 0.0094  # diameter; larger suns have soft shadows that are not carried
+REAL_SUN_RAD = 0.0094  # diameter; larger suns become a disc in the picture of the world
 
 
 @dataclass
@@ -28,11 +28,13 @@ class Lamps:
     frame: Frame
     copies: Copies
     note: object
+    world_is_plain: bool
     lights: list = field(default_factory=list)
     objects: dict = field(default_factory=dict)
     obj: list = field(default_factory=list)
     names: dict = field(default_factory=dict)  # full name of an object -> names of its lamps
     soft: int = 0
+    soft_sun: tuple | None = None  # unit vector towards it, irradiance, angular radius
 
     def add(self, name, light, matrix):
         """A lamp of Blender at the world matrix of its object."""
@@ -50,9 +52,7 @@ class Lamps:
         elif light.type == "AREA":
             self._face(name, light, matrix, [power * c for c in tint])
         elif light.type == "SUN":
-            if light.angle > REAL_SUN_RAD:
-                self.note(f"light {name}: its angle of {math.degrees(light.angle):.3g} degrees: its shadows are sharp")
-            self._light("directional", name, direction=behind(matrix), irradiance=[power * c for c in tint])
+            self._sun(name, light.angle, behind(matrix), [power * c for c in tint])
         else:
             self.soft += light.shadow_soft_size > 0
             self._lamp(name, light, matrix, [power * c / (4 * math.pi) for c in tint])
@@ -64,6 +64,16 @@ class Lamps:
 
     def _light(self, kind, name, **values):
         self.lights.append({"kind": kind, "name": name, **values})
+
+    def _sun(self, name, angle, direction, irradiance):
+        """A sharp sun; or, of a scene's suns, the first soft one where the world leaves room for it."""
+        if angle <= REAL_SUN_RAD:
+            self._light("directional", name, direction=direction, irradiance=irradiance)
+        elif self.soft_sun is None and self.world_is_plain:
+            self.soft_sun = ([-x for x in direction], irradiance, angle / 2)
+        else:
+            self.note(f"light {name}: its angle of {math.degrees(angle):.3g} degrees: its shadows are sharp")
+            self._light("directional", name, direction=direction, irradiance=irradiance)
 
     def _lamp(self, name, light, matrix, intensity):
         place = {"position": self.frame.place(matrix.translation), "intensity": intensity}

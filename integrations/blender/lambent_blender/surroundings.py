@@ -5,8 +5,12 @@ from __future__ import annotations
 import math
 from pathlib import PurePath
 
+import bpy
+import numpy as np
+
 from .lamps import source
 
+ROWS = 1024  # of the picture of a soft sun
 READ = (".exr", ".hdr", ".png", ".jpg", ".jpeg")
 
 
@@ -34,6 +38,18 @@ def environment_of(world, copies, note):
         return _picture(node, strength, copies, note)
     note(f"world: a {node.name} is not carried")
     return None
+
+
+def with_sun(environment, towards, irradiance, radius_rad, copies):
+    """The [environment] of a scene.toml whose plain world also shows a disc that gives this irradiance."""
+    theta, phi = ((np.arange(n) + 0.5) / n * np.pi for n in (ROWS, 2 * ROWS))
+    level, phi = np.sin(theta)[:, None], 2 * phi - np.pi
+    cosine = level * np.sin(phi) * towards[0] + np.cos(theta)[:, None] * towards[1] - level * np.cos(phi) * towards[2]
+    disc = np.clip((radius_rad - np.arccos(np.clip(cosine, -1, 1))) * ROWS / np.pi + 0.5, 0, 1)
+    gain = np.array(irradiance) / ((np.pi / ROWS) ** 2 * (disc * level * cosine).sum())
+    pixels = np.ones((ROWS, 2 * ROWS, 4), np.float32)
+    pixels[..., :3] = disc[..., None] * gain + (environment or {"radiance": [0.0] * 3})["radiance"]
+    return {"kind": "image", "file": _as_exr("sun", 2 * ROWS, ROWS, pixels[::-1].ravel(), copies), "layout": "lat-long"}
 
 
 def _sky(node, strength, note):
@@ -88,7 +104,7 @@ def _is_generated(socket):
 
 
 def image_file(image, copies, what):
-    """Name of a copy of an image of Blender, packed or not, as EXR unless Lambent reads its format."""
+    """Name of a copy of an image of Blender, packed or not, in a format that Lambent reads."""
     name = PurePath((image.filepath_raw or image.name).replace("\\", "/")).name
     readable = PurePath(name).suffix.lower() in READ
     if readable and image.packed_file is not None:
@@ -98,12 +114,34 @@ def image_file(image, copies, what):
     if not image.has_data and not len(image.pixels):
         copies.note(f"{what}: picture {image.name} is missing: left out")
         return None
-    target = copies.folder / "textures" / f"{PurePath(name).stem or 'picture'}.exr"
-    target.parent.mkdir(parents=True, exist_ok=True)
-    written_as = image.file_format
+    stem = PurePath(name).stem or "picture"
+    if image.is_float:
+        pixels = np.empty(4 * image.size[0] * image.size[1], np.float32)
+        image.pixels.foreach_get(pixels)
+        return _as_exr(stem, *image.size, pixels, copies)
+    target, written_as = _place(copies, f"{stem}.png"), image.file_format
     try:
-        image.file_format = "OPEN_EXR"
+        image.file_format = "PNG"
         image.save(filepath=str(target), save_copy=True)
     finally:
         image.file_format = written_as
     return target.relative_to(copies.folder).as_posix()
+
+
+def _as_exr(stem, width, height, pixels, copies):
+    """Write RGBA, linear Rec. 709, the lowest row first."""
+    target = _place(copies, f"{stem}.exr")
+    image = bpy.data.images.new(stem, width, height, float_buffer=True, is_data=True)  # or it is saved as sRGB
+    try:
+        image.file_format = "OPEN_EXR"
+        image.pixels.foreach_set(pixels)
+        image.save(filepath=str(target))
+    finally:
+        bpy.data.images.remove(image)
+    return target.relative_to(copies.folder).as_posix()
+
+
+def _place(copies, name):
+    target = copies.folder / "textures" / name
+    target.parent.mkdir(parents=True, exist_ok=True)
+    return target

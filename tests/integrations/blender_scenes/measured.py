@@ -21,7 +21,7 @@ LAMPS = {
     "bulb": ("POINT", {"shadow_soft_size": 0.05, "normalize": False, "exposure": 2.0}),
     "spot": ("SPOT", {"shadow_soft_size": 0.0, "spot_size": 0.8, "spot_blend": 0.3}),
     "sun": ("SUN", {"angle": 0.0}),
-    "wide sun": ("SUN", {"angle": 0.3, "normalize": False}),
+    "wide sun": ("SUN", {"angle": 0.009, "normalize": False, "exposure": 12.0}),
     "square": ("AREA", {"shape": "SQUARE", "size": 0.1}),
     "rectangle": ("AREA", {"shape": "RECTANGLE", "size": 0.1, "size_y": 0.05}),
     "disc": ("AREA", {"shape": "DISK", "size": 0.1}),

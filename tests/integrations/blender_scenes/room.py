@@ -67,6 +67,7 @@ def _lamps(top, sign):
     lamp(top, "bulb", "POINT", 4e5, (0, 0, 200), color=(1, 0.5, 0.25), shadow_soft_size=0)
     lamp(evening, "spot", "SPOT", 6e5, (50, 20, 240), (20, 10, 0), spot_size=1.0, spot_blend=0.4, shadow_soft_size=5)
     lamp(top, "sun", "SUN", 3.0, turn_deg=(40, 0, 30), angle=0.2)
+    lamp(top, "sharp sun", "SUN", 2.0, turn_deg=(10, 0, 60), angle=0.0)
     lamp(top, "panel", "AREA", 2e5, (0, 0, 245), (0, 15, 20), (1, 2, 1), shape="RECTANGLE", size=60, size_y=30)
     lamp(top, "disc #1", "AREA", 1e5, (100, 0, 245), shape="DISK", size=40, spread=1.0)
     bare = lamp(top, "bare", "AREA", 2.0, (-100, 0, 245), shape="SQUARE", size=50)
