@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, label, maximum_filter, uniform_filter
 
 from lambent.core.arrays import Flags, Floats
 from lambent.core.geometry.directions import basis
@@ -135,7 +135,7 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats, cells: float = CE
     for over in HEIGHTS:
         standing = _drawn((_cut(height - over * size, corners) @ axes - corner) / cell, (rows, columns))
         if standing.any():
-            share += (distance_transform_edt(~standing) <= NEAR * size / cell) / len(HEIGHTS)
+            share += (scipy.ndimage.distance_transform_edt(~standing) <= NEAR * size / cell) / len(HEIGHTS)
     if not share.any():
         return None
     fine = filled(((flat - corner) / cell + 0.5) * FINE - 0.5, rows * FINE, columns * FINE)
@@ -146,13 +146,13 @@ def floor_plan(faces: Floats, normal: Floats, corners: Floats, cells: float = CE
     covered = share_of >= 0.5
     edge = covered & ~_inner(covered)
     window = 2 * round(WINDOW * size / cell) + 1
-    along_edge = uniform_filter(edge.astype(float), window, mode="constant")
-    walled = uniform_filter(share * edge, window, mode="constant") >= SHARE * np.maximum(along_edge, 1e-9)
+    along_edge = scipy.ndimage.uniform_filter(edge.astype(float), window, mode="constant")
+    walled = scipy.ndimage.uniform_filter(share * edge, window, mode="constant") >= SHARE * np.maximum(along_edge, 1e-9)
     if not (walled & edge).any():
         return None
-    beyond, nearest = distance_transform_edt(~covered, return_indices=True)
+    beyond, nearest = scipy.ndimage.distance_transform_edt(~covered, return_indices=True)
     past = ~covered & walled[tuple(nearest)]
-    before, wall = distance_transform_edt(~past, return_indices=True)
+    before, wall = scipy.ndimage.distance_transform_edt(~past, return_indices=True)
     outwards, inwards = _edge_from(share_of, covered), _edge_from(1 - share_of, ~covered)
     signed = np.where(past, outwards[tuple(nearest)] - beyond, before - inwards[tuple(wall)])
     steps = np.clip(np.floor((signed - MARGIN) * STEPS), -127, 127).astype(np.int8)
@@ -167,7 +167,7 @@ def _without_strips(covered: Flags, standing: Flags, width: float) -> Flags:
     if not (covered & standing).any():
         return covered
     left = covered & ~standing
-    pieces, count = label(left)
+    pieces, count = scipy.ndimage.label(left)
     cells, border, at_edge = (
         np.bincount(pieces[some], minlength=count + 1) for some in (left, left & ~_inner(left), left & ~_inner(covered))
     )
@@ -184,7 +184,9 @@ def _inner(cells: Flags) -> Flags:
 
 def _edge_from(share: Floats, covered: Flags) -> Floats:
     """Cells from the centre of a covered cell to the edge, by its covered share and its neighbours'."""
-    around = maximum_filter(np.where(covered, 0.0, share), footprint=np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]]))
+    around = scipy.ndimage.maximum_filter(
+        np.where(covered, 0.0, share), footprint=np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]])
+    )
     return np.asarray(np.where(covered, share - 0.5 + around, 0.0))
 
 

@@ -27,8 +27,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
 
 from lambent.baked.answering import loops
 from lambent.baked.answering.rays import Rays, gathered
@@ -78,7 +78,7 @@ class Patches:
 
     def _rows(self, most: float) -> SparseRows:
         sums = self.transfer.sum(axis=1, keepdims=True)
-        rows = csr_matrix(self.transfer * np.minimum(1, most / np.maximum(sums, most)))
+        rows = scipy.sparse.csr_matrix(self.transfer * np.minimum(1, most / np.maximum(sums, most)))
         return SparseRows(rows.indptr[:-1], rows.indptr[1:], rows.indices, rows.data)
 
 

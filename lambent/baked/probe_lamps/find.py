@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from lambent.core.arrays import Floats
 from lambent.core.geometry.cubemap import directions_at, texel_solid_angles
@@ -106,8 +105,8 @@ def _search(rest: Floats, omega: Floats, n: int, total: float, times: float) -> 
     place[at] = np.arange(len(at))
     row, column = np.repeat(np.arange(len(at)), 4), place[beside[at]].ravel()
     joined = column >= 0
-    graph = coo_array((np.ones(joined.sum()), (row[joined], column[joined])), shape=(len(at), len(at)))
-    count, label = connected_components(graph, directed=False)
+    graph = scipy.sparse.coo_array((np.ones(joined.sum()), (row[joined], column[joined])), shape=(len(at), len(at)))
+    count, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
     share = np.bincount(label, light[at], count)
     brightest = np.argsort(-share, kind="stable")[:MOST]
     found = []

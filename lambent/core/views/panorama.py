@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import scipy
 
 from lambent.core.arrays import Floats
 from lambent.core.plain import triple
@@ -65,9 +66,10 @@ def _face_cameras(camera: Camera, side_px: int) -> list[Camera]:
 
 def _looked_up(picture: Floats, camera: Camera, rays: Floats) -> Floats:
     """Bilinear look-up (..., 3) of a square picture along rays (..., 3)."""
-    from scipy.ndimage import map_coordinates  # half a second to import
 
     right, up, forward = camera_axes(camera)
     over = 1 / (math.tan(math.radians(camera.fov_y_deg) / 2) * (rays @ forward))
     places = np.stack([1 - (rays @ up) * over, 1 + (rays @ right) * over]) * (len(picture) / 2) - 0.5
-    return np.stack([map_coordinates(picture[..., c], places, order=1, mode="nearest") for c in range(3)], axis=-1)
+    return np.stack(
+        [scipy.ndimage.map_coordinates(picture[..., c], places, order=1, mode="nearest") for c in range(3)], axis=-1
+    )

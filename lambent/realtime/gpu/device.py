@@ -17,6 +17,7 @@ import wgpu
 from wgpu.backends.wgpu_native import extras
 
 from lambent.core.errors import UserError
+from lambent.realtime.gpu.foreign_types import parse_quickly
 
 MEND = "install a Vulkan driver (Debian: apt-get install mesa-vulkan-drivers libvulkan1)"
 
@@ -89,6 +90,7 @@ def choose_adapter() -> Any:
     """
     _have_runtime_folder()
     _leave_out_opengl()
+    parse_quickly()
     adapters = [a for a in wgpu.gpu.enumerate_adapters_sync() if a.info.get("backend_type") != "OpenGL"]
     if not adapters:
         raise UserError("no graphics adapter found", expected="Vulkan, Metal or Direct3D 12", hint=MEND)

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
-from scipy.spatial import cKDTree
 
 from lambent.baked.light_fields.light_field import NO_POINT, LightField, Sky
 from lambent.baked.light_fields.map_cache import LEAST_RECENT, POLICIES
@@ -144,7 +143,7 @@ class ResidentMaps:
         there = np.fromiter(self._place, int)
         apart = TURNED * float(np.ptp(field.points, axis=0).max())  # no substitute on the far side of a sheet
         keys = np.concatenate([field.points, apart * field.normals], axis=1)
-        nearest = there[cKDTree(keys[there]).query(keys)[1]]
+        nearest = there[scipy.spatial.cKDTree(keys[there]).query(keys)[1]]
         nearest[there] = there
         rows = table.reshape(-1, 4)[: len(field.points)]
         rows[:, :3], rows[:, 3] = field.points[nearest], [self._place[int(point)] for point in nearest]
@@ -154,5 +153,5 @@ class ResidentMaps:
 def filled(sample_map: NDArray[np.uint16]) -> NDArray[np.uint16]:
     """The sample map (h, w, 4) with empty texels filled from the nearest texel with points."""
     bare = (sample_map == NO_POINT).all(axis=-1)
-    rows, columns = distance_transform_edt(bare, return_distances=False, return_indices=True)
+    rows, columns = scipy.ndimage.distance_transform_edt(bare, return_distances=False, return_indices=True)
     return np.asarray(sample_map[rows, columns])

@@ -11,8 +11,8 @@ from collections.abc import Collection
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter, minimum_filter
 
 from lambent.core.arrays import Flags, Floats
 from lambent.core.plain import Triple
@@ -105,7 +105,13 @@ def block_ranges(depths: Floats) -> NDArray[np.float32]:
 def _with_neighbours(least: Floats, greatest: Floats) -> Floats:
     """(layers, n, n, 2) over 3 x 3 of (layers, n, n)."""
     size = (1, 3, 3)
-    return np.stack([minimum_filter(least, size, mode="nearest"), maximum_filter(greatest, size, mode="nearest")], -1)
+    return np.stack(
+        [
+            scipy.ndimage.minimum_filter(least, size, mode="nearest"),
+            scipy.ndimage.maximum_filter(greatest, size, mode="nearest"),
+        ],
+        -1,
+    )
 
 
 def draw_depths(layouts: Layouts, parts: SunParts, resources: Any, panes: Collection[str] = ()) -> Any:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import basis, normalize
@@ -137,6 +138,4 @@ def _cut_about(eyes: Floats, corners: Floats) -> Floats:
 
 def _distances(points: Floats, eyes: Floats) -> Floats:
     """Distances (n,) of points (n, 3) from the nearest eye, at least 1 m."""
-    from scipy.spatial import cKDTree
-
-    return np.asarray(np.maximum(cKDTree(eyes).query(points)[0], 1.0))
+    return np.asarray(np.maximum(scipy.spatial.cKDTree(eyes).query(points)[0], 1.0))
