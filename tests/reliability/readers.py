@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+import lambent
 from lambent.core.geometry.directions import direction
 from lambent.core.light.colour import luminance
 from lambent.core.pictures import exr, rgbe
@@ -23,6 +24,7 @@ from lambent.materials.document import Lobe, Material, Provenance, load_material
 from lambent.materials.measured import load
 from lambent.materials.measured.inspecting import inspection
 from lambent.published.merl_fits import read_fits
+from lambent.realtime.light.baked import read_baked
 from lambent.scenes.camera_paths import sample_path
 from lambent.scenes.loaders.load import formats, load_scene
 from lambent.scenes.looks.textures import digest, parts, prepared
@@ -245,6 +247,7 @@ def _check(scene: Scene) -> None:
 
 
 def use_store(folder: Path) -> None:
+    """Everything that the window, the renderer and `lambent inspect` read of a store."""
     store = Store.open(folder)
     record: SceneRecord = with_views(scene_record(store), read_views(folder))
     for artefact in store.artefacts():
@@ -260,4 +263,5 @@ def use_store(folder: Path) -> None:
         sample_path(path, 0.3)
     for material in list(record.materials.values())[:MATERIALS_USED]:
         _evaluate(material)
-    io.StringIO().write(repr(store.inputs))
+    read_baked(store)
+    json.dumps(lambent.open(folder).facts(), default=str)

@@ -5,10 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import signal
 import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +13,9 @@ import numpy as np
 import pytest
 from numcodecs import Zstd
 
-import lambent
 from lambent.core.errors import UserError
 from lambent.core.views.camera import Camera, CameraPath
 from lambent.materials.document import Lobe, Material
-from lambent.realtime.light.baked import read_baked
 from lambent.scenes.floor_plan import FloorPlan
 from lambent.scenes.scene import MaterialTextures, Texture
 from lambent.store.chunk_files import content_size
@@ -30,20 +25,19 @@ from lambent.store.contract import (
     ReflectorPart,
     ReflectorRecord,
     SceneRecord,
-    baked_views,
-    scene_record,
     view_artefact_name,
     view_meta,
     write_scene_record,
 )  # fmt: skip
-from lambent.store.kept.views import Views, change_views, read_views, with_views
+from lambent.store.kept.views import Views, change_views
 from lambent.store.light_groups import group_name, light_groups
 from lambent.store.occlusion import PROBE_SHARE, probe_shares
-from lambent.store.plans import plan_of, plan_record
+from lambent.store.plans import plan_record
 from lambent.store.store import Store
 from lambent.store.textures import texture_records, write_textures
+from tests.reliability.mutate import LONGEST_S, within
+from tests.reliability.readers import use_store
 
-ALARM_S = 10
 FRONT = Camera("front", (0.0, 1.0, 3.0), (0.0, 1.0, 0.0))
 
 
@@ -91,41 +85,8 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_scene_record(store, record)
         half.write((1, 0), np.float32(3))  # in the journal alone
     change_views(folder, lambda _: Views(cameras=(FRONT,), paths=(CameraPath("tour", (FRONT,) * 2, 2.0, (0.0, 2.0)),)))
-    read_all(folder)
+    use_store(folder)
     return folder
-
-
-def read_all(folder: Path) -> None:
-    """Everything that the window, the renderer and `lambent inspect` read of a store."""
-    store = Store.open(folder)
-    for artefact in store.artefacts():
-        store.read_partial(artefact.name)
-    baked_views(store)
-    record = with_views(scene_record(store), read_views(folder))
-    for reflector in record.reflectors:
-        if reflector.plan is not None:
-            plan_of(reflector.plan)
-    read_baked(store)
-    json.dumps(lambent.open(folder).facts(), default=str)
-
-
-@contextmanager
-def alarm() -> Iterator[None]:
-    """Fails a test that hangs, where the system has alarms."""
-
-    def ring(*_: object) -> None:
-        raise TimeoutError(f"no answer within {ALARM_S} s")
-
-    if not hasattr(signal, "SIGALRM"):
-        yield
-        return
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.alarm(ALARM_S)
-    try:
-        yield
-    finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
 
 
 ARRAYS = ("artefacts",)
@@ -184,7 +145,7 @@ def test_what_is_wrong_is_named(sound: Path, tmp_path: Path, place: tuple[Any, .
     parent[place[-1]] = value
     (folder / "manifest.json").write_text(json.dumps(manifest))
     with pytest.raises(UserError, match=word) as caught:
-        read_all(folder)
+        use_store(folder)
     assert str(folder) in str(caught.value)
 
 
@@ -196,7 +157,7 @@ def test_names_that_are_paths(sound: Path, tmp_path: Path, name: str) -> None:
     manifest["artefacts"][name] = manifest["artefacts"].pop("light_map/raw")
     (folder / "manifest.json").write_text(json.dumps(manifest))
     with pytest.raises(UserError):
-        read_all(folder)
+        use_store(folder)
 
 
 def test_a_number_of_5000_digits(sound: Path, tmp_path: Path) -> None:
@@ -206,7 +167,7 @@ def test_a_number_of_5000_digits(sound: Path, tmp_path: Path) -> None:
         text = (folder / file).read_text()
         (folder / file).write_text(text.replace('"version": ', f'"version": {"9" * 5000}', 1))
         with pytest.raises(UserError, match=file):
-            read_all(folder)
+            use_store(folder)
 
 
 @pytest.mark.parametrize("chunk", [[1 << 15, 1 << 15, 3], [1 << 10, 1 << 10, 3]])
@@ -222,7 +183,7 @@ def test_an_array_of_15_gb_without_files_is_refused_before_it_is_made(tmp_path: 
     }  # fmt: skip
     (tmp_path / "s/manifest.json").write_text(json.dumps(manifest))
     store = Store.open(tmp_path / "s")
-    with alarm(), pytest.raises(UserError, match=r"almost no data on disk|does not fit into memory"):
+    with within(LONGEST_S), pytest.raises(UserError, match=r"almost no data on disk|does not fit into memory"):
         store.read("light_map/irradiance")
 
 
