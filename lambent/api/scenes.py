@@ -54,6 +54,7 @@ class Scene:
             "name": scene.name,
             "objects": len(scene.objects),
             "triangles": self.triangles,
+            "object_names": [o.name for o in scene.objects],
             "materials": sorted(scene.materials),
             "environment": type(scene.environment).__name__ if scene.environment else "none",
             **({"daylight": daylight_in_words(scene.environment)} if isinstance(scene.environment, SunSky) else {}),

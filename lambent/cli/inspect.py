@@ -10,9 +10,10 @@ import typer
 
 from lambent.cli.console import Between, CreaseAngle, Force, Json, show, table, words
 from lambent.core.errors import UserError
-from lambent.core.plain import plain
+from lambent.core.plain import first_of, plain
 
 Facts = dict[str, Any]
+MOST = 60  # names of objects; --json has all
 
 
 def command(
@@ -64,5 +65,7 @@ def _is_prose(value: Any) -> bool:
 def _words(value: Any) -> str:
     if not isinstance(value, list):
         return words(value)
+    if len(value) > MOST and isinstance(value[0], str):
+        return first_of(value, MOST)
     nested = any(isinstance(item, list) for item in value)
     return ("; " if nested else " " if isinstance(value[0], float) else ", ").join(map(_words, value))

@@ -15,6 +15,7 @@ from lambent.baking.bake import bake
 from lambent.core.pictures.images import write_image
 from lambent.core.views.camera import CameraPath
 from lambent.demo.flow import DRAFT, SPECIMEN_OF
+from lambent.editing.session.session import Session
 from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.inspecting.synthetic import Setup, synthesise
 from lambent.materials.measured.parts.gonio_text import write_gonio
@@ -70,7 +71,7 @@ floor = { kd = 0.4 }
 lumens = 600.0
 
 [objects.teapot]
-light_field = { volume = true, points = 16, texels = 14 }
+light_field = { volume = true, points = 9, texels = 14 }
 
 [[light_groups]]
 name = "reading"
@@ -116,6 +117,9 @@ def _materials(folder: Path) -> None:
         write_gonio(folder / name, table)
     for name in ("brushed", "copper", "slate", "satin"):
         BRUSHED.save(folder / f"{name}.json")
+    view = load_scene("builtin:teatray")
+    edits = Session.new("builtin:teatray", view.cameras[0], {"nickel": view.materials["nickel"]}, size=(320, 240))
+    edits.save(folder / "tray.edits.json")
     half, turn = np.meshgrid(np.arange(30) / 30, np.arange(30) / 30, indexing="ij")
     f = 0.1 + 20 * np.exp(-((half / 0.2) ** 2)) + 0 * turn
     (folder / "chrome.binary").write_bytes(merl_bytes(np.repeat(np.repeat(f[..., None, None], 60, 2), 3, 3)))
@@ -154,4 +158,6 @@ def _room(folder: Path) -> None:
     (folder / "scene.toml").rename(folder / "room.toml")
     shutil.copy(folder / "room.toml", folder / "lambent/scenes/builtin/room.toml")
     shutil.copy(folder / "room.glb", folder / "house.glb")
+    for sample in (Path(__file__).parents[2] / "docs/tutorials/files").iterdir():
+        shutil.copy(sample, folder / sample.name)
     (folder / "vase.obj").write_text(trimesh.exchange.obj.export_obj(icosphere(2, 0.2)))

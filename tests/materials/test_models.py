@@ -5,16 +5,12 @@ A declared deficiency is a strict xfail.
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import direction
 from lambent.materials import lobes
-from lambent.materials import models as package
 from lambent.materials.checking import check
 from lambent.materials.fresnel import conductor, ior_of, r0_of, schlick
 from lambent.materials.models import model_named, models
@@ -119,23 +115,9 @@ def test_index_and_reflectance_are_inverse():
     assert [ior_of(r0_of(ior)) for ior in (1.0, 1.33, 2.4)] == pytest.approx([1.0, 1.33, 2.4])
 
 
-PAGE = Path(__file__).parents[2] / "docs" / "adding-a-model.md"
-
-
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
-
-
 @pytest.fixture
 def phong():
     return model_named("phong")
-
-
-@pytest.mark.parametrize("language", ["python", "wgsl"])
-def test_the_example_is_the_file_itself(language):
-    """The tests of all models test that file."""
-    file = Path(package.__path__[0]) / {"python": "phong.py", "wgsl": "phong.wgsl"}[language]
-    assert blocks(language)[0] == file.read_text(encoding="utf-8")
 
 
 def test_the_shader_agrees(phong):
@@ -145,11 +127,6 @@ def test_the_shader_agrees(phong):
     expected = phong(ks=1.0, exponent=8.0).eval(wi.astype(float), wo.astype(float))[:, 0]
     got = run_wgsl(phong.shader(), "lambent_phong(wi, wo, 8.0)", {"wi": wi, "wo": wo})
     assert_parity(got, expected, rtol=1e-5, atol=1e-6 * expected.max())
-
-
-def test_the_snippet_that_uses_it_runs(phong, capsys):
-    exec(compile(blocks("python")[1], str(PAGE), "exec"), {})
-    assert capsys.readouterr().out == "True\n"
 
 
 MODELS = models()
