@@ -76,13 +76,15 @@ def bake(
 ) -> Store:
     """Bake a scene into a store, or bring a store up to date; an interrupted bake resumes.
 
+    Options that are not given are as in the store.
+
     Parameters
     ----------
     scene : Scene, str or Path
         A scene, or its file or "builtin:NAME".
     folder : str or Path
         Of the store, created if needed.
-    quality : {"preview", "normal", "final"}
+    quality : {"draft", "preview", "normal", "final"}
     only : collection of str, optional
         Kinds of arrays, with those that they need; by default all that need no `views`.
     resume : bool
@@ -108,8 +110,6 @@ def bake(
         Called with sentences about what is baked for interreflections.
     progress : bool or callable, optional
         As of `Table.fit`.
-
-    Options that are not given are as in the store.
 
     Raises
     ------
