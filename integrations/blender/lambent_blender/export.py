@@ -120,8 +120,8 @@ def _free(name, taken):
 
 
 def _light_fields(shown, named):
-    wishes = [(pattern, _wish(o)) for o in shown if _wish(o) for pattern in named.patterns(o.name)]
-    return {pattern: {"light_field": wish} for pattern, wish in wishes}
+    wishes = [(o.name, _wish(o)) for o in shown]
+    return {pattern: {"light_field": wish} for name, wish in wishes if wish for pattern in named.patterns(name)}
 
 
 def _wish(o):

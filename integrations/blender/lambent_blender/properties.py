@@ -48,5 +48,8 @@ def unregister():
 
 def setting(block, name):
     """The property of a data block, or else its custom property; None or empty without both."""
+    custom = block.get(
+        name
+    )  # first: Blender 4 drops a custom property of another type when it reads the registered one
     registered = getattr(block, name, None)
-    return block.get(name) if registered in (None, "", "NONE", False) else registered
+    return custom if registered in (None, "", "NONE", False) else registered

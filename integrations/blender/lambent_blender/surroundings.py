@@ -49,7 +49,11 @@ def with_sun(environment, towards, irradiance, radius_rad, copies):
     gain = np.array(irradiance) / ((np.pi / ROWS) ** 2 * (disc * level * cosine).sum())
     pixels = np.ones((ROWS, 2 * ROWS, 4), np.float32)
     pixels[..., :3] = disc[..., None] * gain + (environment or {"radiance": [0.0] * 3})["radiance"]
-    return {"kind": "image", "file": _as_exr("sun", 2 * ROWS, ROWS, pixels[::-1].ravel(), copies), "layout": "lat-long"}
+    return {
+        "kind": "image",
+        "file": _written("sun", 2 * ROWS, ROWS, pixels[::-1].ravel(), True, copies),
+        "layout": "lat-long",
+    }
 
 
 def _sky(node, strength, note):
@@ -114,34 +118,21 @@ def image_file(image, copies, what):
     if not image.has_data and not len(image.pixels):
         copies.note(f"{what}: picture {image.name} is missing: left out")
         return None
-    stem = PurePath(name).stem or "picture"
-    if image.is_float:
-        pixels = np.empty(4 * image.size[0] * image.size[1], np.float32)
-        image.pixels.foreach_get(pixels)
-        return _as_exr(stem, *image.size, pixels, copies)
-    target, written_as = _place(copies, f"{stem}.png"), image.file_format
-    try:
-        image.file_format = "PNG"
-        image.save(filepath=str(target), save_copy=True)
-    finally:
-        image.file_format = written_as
-    return target.relative_to(copies.folder).as_posix()
+    pixels = np.empty(4 * image.size[0] * image.size[1], np.float32)
+    image.pixels.foreach_get(pixels)
+    return _written(PurePath(name).stem or "picture", *image.size, pixels, image.is_float, copies)
 
 
-def _as_exr(stem, width, height, pixels, copies):
-    """Write RGBA, linear Rec. 709, the lowest row first."""
-    target = _place(copies, f"{stem}.exr")
-    image = bpy.data.images.new(stem, width, height, float_buffer=True, is_data=True)  # or it is saved as sRGB
+def _written(stem, width, height, pixels, is_float, copies):
+    """Name of a file of RGBA, the lowest row first: floats, linear, as EXR; or bytes, sRGB, as PNG."""
+    target = copies.folder / "textures" / f"{stem}.{'exr' if is_float else 'png'}"
+    target.parent.mkdir(parents=True, exist_ok=True)
+    # Blender would save floats as sRGB, were they not data
+    image = bpy.data.images.new(stem, width, height, alpha=True, float_buffer=is_float, is_data=is_float)
     try:
-        image.file_format = "OPEN_EXR"
+        image.file_format = "OPEN_EXR" if is_float else "PNG"
         image.pixels.foreach_set(pixels)
         image.save(filepath=str(target))
     finally:
         bpy.data.images.remove(image)
     return target.relative_to(copies.folder).as_posix()
-
-
-def _place(copies, name):
-    target = copies.folder / "textures" / name
-    target.parent.mkdir(parents=True, exist_ok=True)
-    return target
