@@ -197,8 +197,8 @@ def test_every_dependency_is_pinned() -> None:
 
 def test_every_dependency_is_used_and_every_import_is_a_dependency() -> None:
     needed, for_tests = dependencies()
-    comes_along = {"drjit", "llvmlite"}  # with mitsuba, with numba
-    beside = {"bpy", "lambent_blender"}  # installed by run.py, and by the wheel
+    comes_along = {"drjit", "llvmlite", "IPython"}  # with mitsuba, with numba, with the kernel of a notebook
+    beside = {"bpy", "addon_utils", "lambent_blender"}  # installed by run.py, and by the wheel
     by_others = {"jupyter_rfb"}  # rendercanvas imports it
     assert third_party(MODULES) | by_others == set(needed.values()) | comes_along
     assert third_party(TESTS) - {path.stem for path in TESTS} <= set((needed | for_tests).values()) | comes_along | beside

@@ -26,7 +26,7 @@ MOST_WARNINGS = 12  # lines on stderr; --json and `lambent inspect` have all
 
 
 def command(
-    scene: Annotated[str, typer.Argument(help="scene.toml, glTF, OBJ, Mitsuba XML, or builtin:room.")],
+    scene: Annotated[str, typer.Argument(help="scene.toml, glTF, OBJ, Mitsuba XML, .blend, or builtin:room.")],
     output: Annotated[Path | None, typer.Option("-o", help="Folder of the store to write.")] = None,
     only: Annotated[list[Kind] | None, typer.Option(help="Bake this kind and the kinds it needs. Repeatable.")] = None,
     quality: Annotated[QualityName, typer.Option(help="Resolution and sample counts.")] = QualityName.preview,
