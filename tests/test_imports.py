@@ -201,4 +201,5 @@ def test_every_dependency_is_used_and_every_import_is_a_dependency() -> None:
     beside = {"bpy", "addon_utils", "lambent_blender"}  # installed by run.py, and by the wheel
     by_others = {"jupyter_rfb"}  # rendercanvas imports it
     assert third_party(MODULES) | by_others == set(needed.values()) | comes_along
-    assert third_party(TESTS) - {path.stem for path in TESTS} <= set((needed | for_tests).values()) | comes_along | beside
+    of_tests = third_party(TESTS) - {path.stem for path in TESTS} - beside
+    assert of_tests <= set((needed | for_tests).values()) | comes_along
