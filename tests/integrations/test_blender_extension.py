@@ -73,13 +73,25 @@ def test_bake_and_walk_run_in_the_background(blender, tmp_path):
     said = blender("extension", "jobs", tmp_path, stand_in(tmp_path))
     store, scene = str(tmp_path / "box.store"), str(tmp_path / "box.lambent/scene.toml")
     bake, walk = ["bake", scene, "-o", store, "--quality", "final"], ["walk", store]
-    assert asked(tmp_path)[:2] == [bake, walk] and said["done"] == ["final", store, "done", "light map: 3.1 s"]
+    assert asked(tmp_path)[:2] == [bake, walk] and said["done"] == ["bake", "walk", "done", "light map: 3.1 s"]
     assert said["can start again"]
     assert said["failed"][-2:] == ["failed", "error: out of paint"]
     assert said["running"] == [True, False]
     assert said["stopped"][-2:] == ["stopped", "stopped; finished work stays, and the next bake continues"]
     assert said["missing"][-2] == "failed" and "cannot be started (No such file" in said["missing"][-1]
     assert [words[0] for words in asked(tmp_path)] == ["bake", "walk", "bake", "bake"]
+
+
+def test_panels_offer_what_there_is(blender, tmp_path):
+    found = blender("extension", "panels", tmp_path, stand_in(tmp_path))
+    assert found["shown"] == {
+        "LAMBENT_PT_sidebar": [
+            "Quality", "Bake and walk", "Stop", "walk: done", "light map: 3.1 s", "Export", "Import light map"
+        ],
+        "LAMBENT_PT_material": ["File", "Preview"], "LAMBENT_PT_light": ["Luminaire"],
+        "LAMBENT_PT_object": ["Light field"], "LAMBENT_PT_collection": ["Light group"],
+    }  # fmt: skip
+    assert found["gone"]
 
 
 def test_a_material_shows_the_likeness_of_its_document(blender, tmp_path):

@@ -80,7 +80,7 @@ class LAMBENT_OT_bake_and_walk(_Action, bpy.types.Operator):
         file, quality = Path(bpy.data.filepath), context.scene.lambent_quality.lower()
         scene, store = self.export(context, folder_of(file)).scene, str(file.with_suffix(".store"))
         bake = [*command, "bake", str(scene), "-o", store, "--quality", quality]
-        jobs[:] = [Job([bake, [*command, "walk", store]])]
+        jobs[:] = [Job([("bake", bake), ("walk", [*command, "walk", store])])]
         bpy.app.timers.register(_follow, first_interval=INTERVAL_S)
 
 

@@ -17,7 +17,7 @@ class LAMBENT_PT_sidebar(bpy.types.Panel):
         layout.operator("lambent.bake_and_walk")
         layout.operator("lambent.stop")
         if jobs:
-            layout.label(text=f"{jobs[-1].words[-1]}: {jobs[-1].state}")
+            layout.label(text=f"{jobs[-1].step}: {jobs[-1].state}")
             layout.label(text=jobs[-1].line, icon="ERROR" if jobs[-1].state == "failed" else "INFO")
         layout.operator("lambent.export", text="Export")
         layout.operator("lambent.light_map", text="Import light map")

@@ -17,7 +17,7 @@ def command_of(preference):
 
 
 class Job:
-    """Commands one after the other; each begins when the one before it has ended well.
+    """Commands (name, words) one after the other; each begins when the one before it has ended well.
 
     `line` is what the running one said last, with the event `said`; `state` is running, done, failed or stopped.
     """
@@ -47,7 +47,7 @@ class Job:
             self.state, self.line = "stopped", STOPPED
 
     def _next(self):
-        self.words = self._steps.pop(0)
+        self.step, self.words = self._steps.pop(0)
         try:
             self.process = _started(self.words)
         except RuntimeError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 sys.path.insert(0, str(Path(__file__).parent))
 import bpy
@@ -41,7 +42,7 @@ def followed(job) -> list[str]:
     states = []
     while job.poll():
         job.process.wait()
-        states.append(job.words[-1])
+        states.append(job.step)
     return [*states, job.state, job.line]
 
 
@@ -135,6 +136,51 @@ def _pixels(image) -> list:
     return [[values[4 * (r * width + c) : 4 * (r * width + c) + 3] for c in range(width)] for r in range(height)]
 
 
+class Layout:
+    """Notes what a panel shows; every property and operator must exist."""
+
+    def __init__(self):
+        self.shown = []
+
+    def prop(self, block, name, **options):
+        self.shown.append(f"{block.bl_rna.properties[name].name}")
+
+    def operator(self, name, text=""):
+        group, _, one = name.partition(".")
+        self.shown.append(text or getattr(getattr(bpy.ops, group), one).get_rna_type().name)
+
+    def label(self, text, icon=""):
+        self.shown.append(text)
+
+
+def panels() -> dict:
+    scene = empty_scene()
+    o = put(scene.collection, "box", box("box"))
+    o.data.materials.append(look("paint"))
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "box.blend"))
+    act, operators = enabled()
+    from lambent_blender import panels
+
+    act.bake_and_walk()
+    operators.jobs[-1].process.wait()
+    while operators.jobs[-1].poll():
+        operators.jobs[-1].process.wait()
+    context = SimpleNamespace(
+        scene=scene, object=o, material=o.active_material, light=bpy.data.lights.new("l", "SPOT"),
+        collection=scene.collection,
+    )  # fmt: skip
+    found = {}
+    for panel in panels.CLASSES:
+        layout = Layout()
+        assert panel.poll(context) if hasattr(panel, "bl_context") else True
+        panel.draw(SimpleNamespace(layout=layout), context)
+        found[panel.__name__] = layout.shown
+    import addon_utils
+
+    addon_utils.disable(ADDON)
+    return {"shown": found, "gone": not hasattr(bpy.types.Material, "lambent_material")}
+
+
 if __name__ == "__main__":
-    tasks = {"refusals": refusals, "jobs": jobs, "likeness": likeness, "walked": walked}
+    tasks = {"panels": panels, "refusals": refusals, "jobs": jobs, "likeness": likeness, "walked": walked}
     sys.stdout.write(f"\ntruth: {json.dumps(tasks[sys.argv[1]]())}\n")
