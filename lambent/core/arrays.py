@@ -1,4 +1,4 @@
-"""Array types, and hashes of points."""
+"""Array types, hashes of points, and sums, ranges and components of things with numbers."""
 
 from __future__ import annotations
 
@@ -17,3 +17,22 @@ def hashes(points: Floats) -> Indices:
     bits = np.asarray(points + 0.0, np.float32).view(np.int32).astype(np.int64)  # -0 is 0
     mixed = bits @ MIXERS[: bits.shape[1]]
     return np.asarray((mixed ^ (mixed >> 29)) * MIXERS[0])
+
+
+def sums_of(values: Floats, of: NDArray[np.integer], count: int) -> Floats:
+    """(count, C) sums of values (n, C) over those that belong to each number, `of` (n,)."""
+    return np.stack([np.bincount(of, column, minlength=count) for column in values.T], axis=1)
+
+
+def ranges(counts: NDArray[np.integer]) -> Indices:
+    """0, 1, ..., c - 1 for each c of counts, concatenated."""
+    return np.asarray(np.arange(int(counts.sum())) - np.repeat(np.cumsum(counts) - counts, counts))
+
+
+def components(pairs: NDArray[np.integer], count: int) -> Indices:
+    """(count,) number of the component of each of `count` things that are connected in pairs (n, 2)."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_matrix((np.ones(len(pairs), bool), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from lambent.baking.running.tiles import slices
 from lambent.baking.tracing.rays import array_of, has_holes, in_shadow, intersect, leaving, vectors
 from lambent.baking.transport.view_points import ViewPoints
-from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.arrays import Flags, Floats, Indices, ranges
 from lambent.core.geometry.octahedral import texel_directions, to_square
 
 TABLE = 512  # texels along a side of the octahedral map for looking up cells
@@ -54,8 +54,7 @@ def neighbours(directions: Floats) -> NDArray[np.int64]:
     edges = np.unique(both, axis=0)
     count = np.bincount(edges[:, 0], minlength=len(directions))
     table = np.repeat(np.arange(len(directions))[:, None], count.max(), axis=1)
-    place = np.arange(len(edges)) - np.repeat(np.cumsum(count) - count, count)
-    table[edges[:, 0], place] = edges[:, 1]
+    table[edges[:, 0], ranges(count)] = edges[:, 1]
     return table
 
 

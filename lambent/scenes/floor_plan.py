@@ -17,7 +17,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from lambent.core.arrays import Flags, Floats
+from lambent.core.arrays import Flags, Floats, ranges
 from lambent.core.geometry.directions import basis
 from lambent.core.geometry.triangles import cross_2d
 
@@ -212,7 +212,7 @@ def _drawn(segments: Floats, shape: tuple[int, int]) -> Flags:
     segments = segments[near]
     count = np.ceil(2 * np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)).astype(int).clip(0, 8 * max(shape)) + 1
     number = np.repeat(np.arange(len(count)), count)
-    share = (np.arange(len(number)) - np.repeat(np.cumsum(count) - count, count)) / np.maximum(count[number] - 1, 1)
+    share = ranges(count) / np.maximum(count[number] - 1, 1)
     at = np.round(segments[number, 0] + share[:, None] * (segments[number, 1] - segments[number, 0])).astype(int)
     at = at[((at >= 0) & (at <= last)).all(axis=1)]
     standing[at[:, 1], at[:, 0]] = True

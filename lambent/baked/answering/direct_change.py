@@ -20,7 +20,7 @@ from lambent.baked.answering.answer import (
     upsampled,
 )
 from lambent.baked.answering.rays import gathered
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Floats, sums_of
 
 FAINT = 0.05  # of the mean indirect light: what is darker says nothing of what comes
 
@@ -64,5 +64,5 @@ def _means(light: Floats, of: NDArray[np.integer], count: int) -> NDArray[np.flo
     """Means (G, count, 3) of light (G, n, 3) over those that belong to each number, `of` (n,); -1 is for none."""
     known = of >= 0
     number = np.maximum(np.bincount(of[known], minlength=count), 1)
-    sums = [[np.bincount(of[known], one[known], count) for one in group.T] for group in light]
-    return np.asarray(np.moveaxis(np.array(sums) / number, 1, 2), np.float32)
+    sums = [sums_of(group[known], of[known], count) for group in light]
+    return np.asarray(np.array(sums) / number[:, None], np.float32)

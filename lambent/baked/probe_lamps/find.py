@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Floats, components
 from lambent.core.geometry.cubemap import directions_at, texel_solid_angles
 from lambent.core.geometry.directions import normalize
 from lambent.core.light.colour import luminance
@@ -105,9 +104,8 @@ def _search(rest: Floats, omega: Floats, n: int, total: float, times: float) -> 
     place[at] = np.arange(len(at))
     row, column = np.repeat(np.arange(len(at)), 4), place[beside[at]].ravel()
     joined = column >= 0
-    graph = scipy.sparse.coo_array((np.ones(joined.sum()), (row[joined], column[joined])), shape=(len(at), len(at)))
-    count, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
-    share = np.bincount(label, light[at], count)
+    label = components(np.column_stack([row[joined], column[joined]]), len(at))
+    share = np.bincount(label, light[at])
     brightest = np.argsort(-share, kind="stable")[:MOST]
     found = []
     for number in brightest[share[brightest] >= LEAST_SHARE * total]:

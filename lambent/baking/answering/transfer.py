@@ -13,7 +13,7 @@ from lambent.baking.answering.rays import NOWHERE, RayEnds
 from lambent.baking.answering.spots import Spots
 from lambent.baking.running.tiles import seed_of
 from lambent.baking.surfaces.texels import Sides
-from lambent.core.arrays import Floats, Indices
+from lambent.core.arrays import Floats, Indices, sums_of
 
 AROUND = 16  # texels that the rays of a point start from
 STRIDE = 8  # of the texels that viewers see, whose rays count for how important others are
@@ -109,8 +109,7 @@ def patch_means(spots: Spots, clusters: Clusters, values: Floats) -> Floats:
             mine = np.flatnonzero(mask[side] & (clusters.of[side] >= 0))
             of, weight = clusters.of[side][mine], spots.area[mine]
             areas += np.bincount(of, weight, clusters.count)
-            for channel in range(values.shape[-1]):
-                sums[:, channel] += np.bincount(of, weight * values[side, mine, channel], clusters.count)
+            sums += sums_of(weight[:, None] * values[side, mine], of, clusters.count)
     means = total / np.maximum(area, 1e-30)[:, None]
     lit = lit_total / np.maximum(lit_area, 1e-30)[:, None]
     return np.where((lit_area > 0)[:, None], lit, means)
@@ -123,8 +122,7 @@ def sender_means(spots: Spots, senders: Indices, values: Floats, count: int) -> 
         mine = np.flatnonzero(spots.lit[side] & (senders[side] >= 0))
         of, weight = senders[side][mine], spots.area[mine]
         area += np.bincount(of, weight, count)
-        for channel in range(values.shape[-1]):
-            total[:, channel] += np.bincount(of, weight * values[side, mine, channel], count)
+        total += sums_of(weight[:, None] * values[side, mine], of, count)
     return np.asarray(total / np.maximum(area, 1e-30)[:, None])
 
 

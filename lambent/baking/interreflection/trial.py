@@ -18,6 +18,7 @@ from lambent.baking.interreflection.tiles import Job, Tile, TileTracer, paths_at
 from lambent.baking.transport.view import View
 from lambent.baking.transport.view_points import ViewPoints
 from lambent.baking.transport.view_tracer import ViewTracer
+from lambent.core.arrays import ranges
 from lambent.core.files import folder_bytes
 from lambent.core.light.colour import luminance
 from lambent.materials.factored.albedo import albedo
@@ -174,7 +175,7 @@ def _repeated(tile: Tile, points: int) -> Tile:
     turn = np.arange(points) % tile.points
     begin = np.concatenate([[0], np.cumsum(counts[:-1], dtype=np.int64)])
     size = counts[turn].astype(np.int64)
-    at = np.repeat(begin[turn] - (np.cumsum(size) - size), size) + np.arange(size.sum())
+    at = np.repeat(begin[turn], size) + ranges(size)
     return Tile(np.concatenate([counts[turn], codes[at], packed[at]]), tile.unit, points)
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.baking.surfaces.texels import BEYOND
-from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.arrays import Flags, Floats, Indices, ranges
 from lambent.core.light.colour import luminance
 
 SMOOTH = 0.98  # least cosine between the normals on both sides of a cut; at sharper cuts light may change abruptly
@@ -64,8 +64,7 @@ def cuts_of(geometry: dict[str, Floats], width: int, height: int) -> Cuts:
     longest = np.maximum(*(np.linalg.norm((side[:, 1] - side[:, 0]) * size, axis=1) for side in (a, b)))
     count = np.ceil(longest * PER_TEXEL).astype(int).clip(1, MOST_SAMPLES)
     edge = np.repeat(np.arange(len(a)), count)
-    turn = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
-    t = ((turn + 0.5) / count[edge])[:, None]
+    t = ((ranges(count) + 0.5) / count[edge])[:, None]
     return Cuts(*(side[edge, 0] * (1 - t) + side[edge, 1] * t for side in (a, b)))
 
 

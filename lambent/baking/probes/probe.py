@@ -19,7 +19,7 @@ from lambent.baking.light.cache import LightMapCache
 from lambent.baking.running.tiles import slices
 from lambent.baking.tracing import path_tracer, rays
 from lambent.baking.tracing.rays import array_of, block_sums, vectors
-from lambent.core.arrays import Floats, Indices
+from lambent.core.arrays import Floats, Indices, sums_of
 from lambent.core.geometry.cubemap import face_directions, faces_at
 from lambent.core.geometry.directions import normalize
 from lambent.core.light.colour import in_halves, luminance
@@ -77,8 +77,7 @@ def bake_probe(scene: Surroundings, centre: Floats, n: int, samples: int, seed: 
     needed = _blocks_needed(first[:, :3], squares.reshape(-1, base, 3).sum(axis=1), base * block, noise) * base
     more = np.repeat(texels, np.ceil(needed).astype(int) - base)
     extra = _sums(scene, centre[None], n, more, block, rng)[0]
-    for channel in range(first.shape[1]):
-        first[:, channel] += np.bincount(more, extra[:, channel], minlength=len(texels))
+    first += sums_of(extra, more, len(texels))
     count = (base + np.bincount(more, minlength=len(texels))) * block
     means = (first / count[:, None]).reshape(6, n, n, -1, 3)
     rounded, unit = in_halves(means[..., 0, :])

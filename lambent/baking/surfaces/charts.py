@@ -17,7 +17,7 @@ import xatlas
 from lambent.baking.surfaces.clusters import clusters_of
 from lambent.baking.surfaces.copies import Copies
 from lambent.baking.surfaces.layers import in_first_layer, layers_of, lie_flat
-from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.arrays import Flags, Floats, Indices, components
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.triangles import area_vectors, cross_2d, triangle_areas, triangle_normals
@@ -156,17 +156,11 @@ def _charts(mesh: Mesh, faces: Indices, pieces: list[tuple[Floats, Indices, Floa
     Faces without area in the map, stretched ones, and those that pass others of their chart within a texel have no
     corners (K, 0, 2).
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     first = np.cumsum([0, *(len(vertices) for vertices, _, _ in pieces)])
     uv = np.concatenate([np.zeros((0, 2), np.float32), *(own for _, _, own in pieces)])
     each = (own.astype(np.int64) + start for (_, own, _), start in zip(pieces, first, strict=False))
     indices = np.concatenate([np.zeros((0, 3), np.int64), *each])
-    edges = np.concatenate([indices[:, :2], indices[:, 1:]])
-    shape = (len(uv), len(uv))
-    graph = coo_matrix((np.ones(len(edges), bool), (edges[:, 0], edges[:, 1])), shape=shape)
-    label = connected_components(graph, directed=False)[1][indices[:, 0]]
+    label = components(np.concatenate([indices[:, :2], indices[:, 1:]]), len(uv))[indices[:, 0]]
     world = mesh.corners_of(faces) / size_m[:, None, None]
     corners = _in_texels(world, uv[indices].astype(float), label)
     lost = ~np.isfinite(corners).all(axis=(1, 2)) | _is_stretched(world, corners)

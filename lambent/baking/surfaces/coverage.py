@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.baking.running.tiles import slices
-from lambent.core.arrays import Floats, Indices
+from lambent.core.arrays import Floats, Indices, ranges
 from lambent.core.geometry.triangles import cross_2d, triangle_areas
 
 CANDIDATES_AT_ONCE = 1 << 20  # (triangle, texel) pairs tested at a time: about 200 MB
@@ -84,7 +84,7 @@ def _pairs(corners: Floats, width: int, height: int, reach: float) -> Iterator[t
     while start < len(corners):
         stop = start + max(1, int(np.searchsorted(np.cumsum(pairs[start:]), CANDIDATES_AT_ONCE, side="right")))
         face = np.repeat(np.arange(start, min(stop, len(corners))), pairs[start:stop])
-        number = np.arange(len(face)) - np.repeat(np.cumsum(pairs[start:stop]) - pairs[start:stop], pairs[start:stop])
+        number = ranges(pairs[start:stop])
         yield face, low[face, 0] + number % counts[face, 0], low[face, 1] + number // counts[face, 0]
         start = stop
 

@@ -7,11 +7,13 @@ close to it, the next does the same with the rest.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numba
 import numpy as np
 
 from lambent.baking.surfaces.packing import meets, near, snapped
-from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.arrays import Flags, Floats, Indices, sums_of
 
 BEHIND = 2.0  # largest difference in depth, in texels, of projected faces that share a texel
 REACH = 3.6  # largest distance in texels, with margin, between places from which look-ups touch one texel
@@ -48,10 +50,7 @@ def lie_flat(corners: Floats, places: Floats, chart: Indices) -> Flags:
         return np.zeros(0, bool)
     of, count = np.repeat(chart, 3), int(chart.max()) + 1
     number = np.maximum(np.bincount(of, minlength=count), 1)
-
-    def summed(values: Floats) -> Floats:
-        return np.stack([np.bincount(of, column, minlength=count) for column in values.T], axis=1)
-
+    summed = partial(sums_of, of=of, count=count)
     uv, xyz = corners.reshape(-1, 2), places.reshape(-1, 3)
     uv = uv - (summed(uv) / number[:, None])[of]
     xyz = xyz - (summed(xyz) / number[:, None])[of]

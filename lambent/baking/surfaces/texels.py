@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lambent.baking.surfaces.coverage import Pieces, corners_of, density_of, in_cell, pieces_of, placed
-from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.arrays import Flags, Floats, Indices, components
 from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.triangles import area_vectors, cross_2d, triangle_areas
 
@@ -167,13 +167,8 @@ def _surface(geometry: dict[str, Floats], face: Indices, weights: Floats) -> tup
 
 def chart_labels(geometry: dict[str, Floats], texels: Texels) -> Indices:
     """(H, W) number of each texel's chart, -1 in gutters."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    faces, vertices = geometry["faces"].astype(np.int64), len(geometry["positions"])
-    edges = np.concatenate([faces[:, :2], faces[:, 1:]])
-    graph = coo_matrix((np.ones(len(edges), bool), (edges[:, 0], edges[:, 1])), shape=(vertices, vertices))
-    label = connected_components(graph, directed=False)[1]
+    faces = geometry["faces"].astype(np.int64)
+    label = components(np.concatenate([faces[:, :2], faces[:, 1:]]), len(geometry["positions"]))
     labels = np.full(texels.width * texels.height, -1)
     labels[texels.index] = label[faces[texels.face[:, 0], 0]]
     return labels.reshape(texels.height, texels.width)

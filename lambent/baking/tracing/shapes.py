@@ -17,7 +17,7 @@ import numpy as np
 
 from lambent.baking.bsdfs.material_plugin import TANGENT_ATTRIBUTE
 from lambent.baking.tracing.lights.luminaire_emitters import opening_emitter
-from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.arrays import Flags, Floats, Indices, ranges
 from lambent.scenes.geometry import merge, transformed
 from lambent.scenes.scene import IesLight, Scene, SceneObject
 
@@ -110,9 +110,9 @@ class ObjectNumbers:
         self._first_face = mi.UInt32(first_face.astype(np.uint32))
         if not self._alone:
             order = np.concatenate(groups)
-            within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts[order]) - counts[order], counts[order])
+            face = np.repeat(first_face[order], counts[order]) + ranges(counts[order])
             self._object = mi.UInt32(np.repeat(order, counts[order]).astype(np.uint32))
-            self._face = mi.UInt32((np.repeat(first_face[order], counts[order]) + within).astype(np.uint32))
+            self._face = mi.UInt32(face.astype(np.uint32))
         self._by_shape: Any = np.zeros(0, np.uint32)
 
     def add(self, meshes: Sequence[Any], values: Sequence[int]) -> None:

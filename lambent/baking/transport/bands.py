@@ -26,6 +26,7 @@ from lambent.baking.transport.device_lights import lights_on_device
 from lambent.baking.transport.pieces import in_bands
 from lambent.baking.transport.sums import accumulate, add
 from lambent.baking.transport.view_points import ViewPoints
+from lambent.core.arrays import ranges
 from lambent.materials.factored.parametrisations import angle_of
 from lambent.materials.factored.terms import Factor, Term, narrowed, thinned, varies
 from lambent.scenes.sky.triangle_lights import TriangleLights
@@ -112,7 +113,7 @@ def _joined(parts: list[Pairs]) -> Pairs:
     begins = np.cumsum(counts.ravel()).reshape(counts.shape) - counts
     joined = Pairs(counts.sum(axis=1), *(np.empty(counts.sum(), part.dtype) for part in parts[0][1:]))
     for k, part in enumerate(parts):
-        at = np.arange(len(part.light)) + np.repeat(begins[:, k] - (np.cumsum(part.counts) - part.counts), part.counts)
+        at = np.repeat(begins[:, k], part.counts) + ranges(part.counts)
         joined.steps[at], joined.light[at] = part.steps, part.light
     return joined
 

@@ -17,7 +17,7 @@ from lambent.baked.light_fields.lookup import Place
 from lambent.baking.quality import Quality
 from lambent.bench.measuring.bake_context import context_of
 from lambent.bench.measuring.reference import Reference
-from lambent.core.arrays import Floats, Indices
+from lambent.core.arrays import Floats, Indices, sums_of
 from lambent.core.geometry.cubemap import sample
 from lambent.core.geometry.triangles import triangle_areas
 from lambent.core.light.colour import rgb_to_lab
@@ -77,8 +77,7 @@ class Compared:
 def _means(at: Indices, shape: tuple[int, int], radiance: Floats) -> Floats:
     """Image (H, W, 3) of the means of radiance (k, 3) in pixels (k,)."""
     count = np.maximum(np.bincount(at, minlength=shape[0] * shape[1]), 1)
-    sums = [np.bincount(at, channel, minlength=len(count)) / count for channel in radiance.T]
-    return np.stack(sums, axis=-1).reshape(*shape, 3)
+    return (sums_of(radiance, at, len(count)) / count[:, None]).reshape(*shape, 3)
 
 
 class LightFieldView:

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from lambent.core.arrays import Flags, Floats
+from lambent.core.arrays import Flags, Floats, components
 from lambent.core.errors import UserError
 from lambent.core.light.colour import luminance, shown
 from lambent.core.light.photometry import photometric
@@ -172,8 +172,6 @@ def _groups(bright: Flags, rays: Floats) -> NDArray[np.int32]:
     The spherical Delaunay triangulation, computed as a convex hull, contains the shortest links between groups.
     """
     from scipy.ndimage import binary_erosion, label
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import ConvexHull
 
     touching, count = label(bright, np.ones((3, 3)))
@@ -186,7 +184,5 @@ def _groups(bright: Flags, rays: Floats) -> NDArray[np.int32]:
     links = np.concatenate([found[:, [0, 1]], found[:, [1, 2]], found[:, [2, 0]]])
     links = links[(links < len(points)).all(axis=1)]
     near = (points[links[:, 0]] * points[links[:, 1]]).sum(axis=1) > math.cos(GAP_RAD)
-    one, other = mine[links[near]].T
-    graph = coo_matrix((np.ones(len(one)), (one, other)), shape=(count, count))
-    _, merged = connected_components(graph, directed=False)
+    merged = components(mine[links[near]], count)
     return np.where(touching > 0, np.concatenate([[0], merged + 1])[touching], 0).astype(np.int32)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from lambent.core.arrays import Flags, Indices
+from lambent.core.arrays import Flags, Indices, sums_of
 from lambent.core.geometry.directions import FLIP_Z, Floats, direction
 from lambent.materials.bsdf import MaterialBSDF, more_than_arrives
 from lambent.materials.document import Kind, Material, Side
@@ -61,8 +61,7 @@ class Curve:
 
     def of(self, f: Floats) -> Floats:
         """Albedo (A, C) of a model's f (N, C) in 1/sr at the pairs."""
-        light = f * self.pairs.weight[:, None]
-        return np.stack([np.bincount(self.which, light[:, c], len(self.theta_deg)) for c in range(f.shape[1])], axis=1)
+        return sums_of(f * self.pairs.weight[:, None], self.which, len(self.theta_deg))
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.baked.answering.stored import StoredAnswer
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Floats, sums_of
 from lambent.core.geometry.directions import normalize
 from lambent.realtime.answering.texture_detail import samples_of
 from lambent.realtime.lamps.drawn import ShadowedLamp
@@ -43,9 +43,8 @@ class LampChanges:
         corner = baked.faces[samples.face].astype(np.int64)
         both = (np.asarray(of, float)[corner] for of in (baked.positions, baked.normals))
         values = np.concatenate([np.einsum("nk,nkc->nc", samples.weights, of) for of in both], axis=1)
-        sums = np.stack([np.bincount(samples.texel, one, height * width) for one in (*values.T, np.ones(len(values)))])
-        here = sums[:, stored.texels // 2]
-        around = np.stack([np.bincount(stored.answer.near.closest, one, len(stored.point_sun)) for one in here])
-        here = np.where(here[6] > 0, here, around[:, stored.answer.near.closest])
+        sums = sums_of(np.column_stack([values, np.ones(len(values))]), samples.texel, height * width)
+        here, closest = sums[stored.texels // 2], stored.answer.near.closest
+        here = np.where(here[:, 6:] > 0, here, sums_of(here, closest, len(stored.point_sun))[closest])
         sign = np.where(stored.texels % 2 == 0, 1.0, -1.0)
-        return (here[:3] / np.maximum(here[6], 1)).T, normalize(here[3:6].T.astype(float)) * sign[:, None]
+        return here[:, :3] / np.maximum(here[:, 6:], 1), normalize(here[:, 3:6].astype(float)) * sign[:, None]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from lambent.baked.answering.answer import MOST_ALBEDO, Albedos, Answer
 from lambent.baked.answering.stored import SeenSpots, StoredAnswer
-from lambent.core.arrays import Floats, Indices
+from lambent.core.arrays import Floats, Indices, sums_of
 from lambent.core.geometry.cubemap import face_directions
 from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.triangles import triangle_areas
@@ -113,18 +113,16 @@ class TextureDetails:
         count, patches = len(answer.points.material), len(answer.patches.material)
         first = len(answer.albedos.reflected)
         old = luminance(_mean_values(before, samples.uv).astype(float))[:, None]
-        both = np.concatenate([old, _mean_values(after, samples.uv)], axis=1)
-        sums, whole = np.zeros((count, 5)), np.append(both.sum(axis=0), len(both))
+        both = np.concatenate([old, _mean_values(after, samples.uv), np.ones_like(old)], axis=1)
+        sums = np.zeros((count, 5))
         for side in range(2):
             sender = self._sender_of_code[2 * samples.texel + side]
             known = sender >= 0
-            for channel in range(4):
-                sums[:, channel] += np.bincount(sender[known], both[known, channel], count)
-            sums[:, 4] += np.bincount(sender[known], minlength=count)
-        of_patches = np.stack([np.bincount(answer.points.patch, one, patches) for one in sums.T], axis=1)
+            sums += sums_of(both[known], sender[known], count)
+        of_patches = sums_of(sums, answer.points.patch, patches)
         everyone = np.concatenate([answer.points.material, answer.patches.material])
         of_rows = np.concatenate([sums, of_patches])
-        of_rows[of_rows[:, 4] == 0] = whole  # no sample near: the mean of the material
+        of_rows[of_rows[:, 4] == 0] = both.sum(axis=0)  # no sample near: the mean of the material
         ratio = of_rows[:, 1:4] / np.maximum(of_rows[:, :1], of_rows[:, 4:] / MOST_RATIO + 1e-30)
         factors[first:][everyone == number] = np.minimum(ratio, MOST_RATIO)[everyone == number]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.baked.light_fields.light_field import NO_POINT, LightField
-from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.arrays import Flags, Floats, Indices, sums_of
 from lambent.core.geometry.triangles import area_vectors
 from lambent.realtime.light_fields.resident_maps import filled
 
@@ -31,8 +31,7 @@ class NeededPoints:
         at = np.einsum("sc,scd->sd", shares, triangles[face])
         pairs, patch, size = np.unique(face * NO_POINT + point, return_inverse=True, return_counts=True)
         faces, self._points = np.divmod(pairs, NO_POINT)
-        sums = [np.bincount(patch, of, minlength=len(pairs)) for of in at.T]
-        self._at = np.stack(sums, axis=-1) / np.maximum(size, 1)[:, None]
+        self._at = sums_of(at, patch, len(pairs)) / np.maximum(size, 1)[:, None]
         self._radius_m = np.zeros(len(pairs))
         np.maximum.at(self._radius_m, patch, np.linalg.norm(at - self._at[patch], axis=-1))
         share = size / np.bincount(faces, size, minlength=len(triangles))[faces]

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from lambent.core.arrays import Floats, Indices
+from lambent.core.arrays import Floats, Indices, ranges
 from lambent.core.ceilings import FACE_CORNERS, PLY_BYTES, TRIANGLES
 from lambent.core.errors import UserError
 from lambent.core.inputs import read_bytes
 from lambent.scenes.loaders.contents import DEFAULTS, Contents, LoadOptions, grey_thing
-from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of, ranges, triangulate
+from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of, triangulate
 
 NAME, ENDINGS = "PLY", (".ply",)
 HEADER_MAX = 1 << 16

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from lambent.core.arrays import Floats, Image, Indices
+from lambent.core.arrays import Floats, Image, Indices, sums_of
 from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.latlong import lat_long_directions
 from lambent.scenes.sky.triangle_lights import icosahedron, solid_angles
@@ -89,7 +89,7 @@ class TriangleTree:
         """
         at, count = self.containing(w), len(self)
         weight = [np.bincount(at, weight_sr, count)]
-        light = [np.stack([np.bincount(at, weight_sr * radiance[:, c], count) for c in range(3)], axis=1)]
+        light = [sums_of(weight_sr[:, None] * radiance, at, count)]
         while len(weight[-1]) > FACES:
             weight.append(weight[-1].reshape(-1, CHILDREN).sum(axis=1))
             light.append(light[-1].reshape(-1, CHILDREN, 3).sum(axis=1))

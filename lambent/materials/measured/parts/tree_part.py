@@ -12,6 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from lambent.core.arrays import sums_of
 from lambent.core.geometry.directions import HALF_TURN, Floats
 from lambent.materials.measured.parts.spectral import rgb_of_equal_energy, within_rec709, xyz_of_yuv
 from lambent.materials.measured.parts.tensor_tree import (
@@ -135,9 +136,7 @@ class TreePart:
             here = place[start : start + _CHUNK]
             cells = self._cells(fixed, here)
             f = np.maximum(self._value(_composed(self.rank, fixed, here[cells.query], cells.middle)), 0)
-            for c in range(self.channels):
-                weighted = np.bincount(cells.query, f[:, c] * cells.side**2, minlength=len(here))
-                total[start : start + _CHUNK, c] = np.pi * weighted
+            total[start : start + _CHUNK] = np.pi * sums_of(f * cells.side[:, None] ** 2, cells.query, len(here))
         return total
 
     def _cells(self, fixed: tuple[int, ...], place: Floats) -> Cells:

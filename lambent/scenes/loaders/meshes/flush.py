@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from lambent.core.arrays import MIXERS, Flags, Floats, Indices, hashes
+from lambent.core.arrays import MIXERS, Flags, Floats, Indices, components, hashes
 from lambent.core.geometry.coplanar import PARALLEL, coplanar_overlaps
 from lambent.core.geometry.triangles import triangle_areas, triangle_normals
 from lambent.core.plain import first_of
@@ -147,20 +147,11 @@ def _sheets(faces: _Faces) -> _Sheets:
     above = faces.above(a, b)
     flat = np.abs((faces.normals[a] * faces.normals[b]).sum(axis=1)) > PARALLEL
     flat &= (np.abs(above) <= 1).all(axis=1)
-    of = _connected(a[flat], b[flat], count)
+    of = components(np.column_stack([a[flat], b[flat]]), count)
     body = np.bincount(of[a], ~flat & (above.sum(axis=1) < 0), of.max() + 1) > 0
     first = np.unique(of, return_index=True)[1]
     area = np.bincount(of, triangle_areas(faces.corners)).astype(float)
     return _Sheets(of, area, faces.owner[first], faces.normals[first], body)
-
-
-def _connected(a: Indices, b: Indices, count: int) -> Indices:
-    """(count,) number of the component of each of `count` things that are connected in pairs a, b (n,)."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_matrix((np.ones(len(a), bool), (a, b)), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
 
 def _order(faces: _Faces, sheets: _Sheets, looks: Indices, pairs: Indices) -> tuple[Indices, Indices, Indices]:
@@ -186,7 +177,7 @@ def _ranks(sheets: _Sheets, looks: Indices, pairs: Indices) -> Indices:
     Areas are added by look among sheets that overlap directly or by others: a rug lies on many small tiles.
     """
     count = len(sheets.area)
-    kind = _connected(pairs[:, 0], pairs[:, 1], count) * (looks.max() + 1) + looks[sheets.owner]
+    kind = components(pairs, count) * (looks.max() + 1) + looks[sheets.owner]
     _, kind = np.unique(kind, return_inverse=True)
     area = np.round(np.log(np.bincount(kind, sheets.area)) / ALIKE)[kind]
     rank = np.empty(count, np.int64)

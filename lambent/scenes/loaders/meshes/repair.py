@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.arrays import Flags, Floats, Indices, hashes
+from lambent.core.arrays import Flags, Floats, Indices, hashes, sums_of
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import basis, normalize
 from lambent.core.geometry.triangles import area_vectors, corner_angles, cross_2d, triangle_areas, triangle_normals
@@ -236,12 +236,6 @@ def _fan(corners: int) -> Indices:
     return np.stack([np.zeros(corners - 2, int), np.arange(1, corners - 1), np.arange(2, corners)], axis=-1)
 
 
-def ranges(counts: Indices) -> Indices:
-    """0, 1, ..., c - 1 for each c of counts, concatenated."""
-    starts = np.cumsum(counts) - counts
-    return np.arange(int(counts.sum())) - np.repeat(starts, counts)
-
-
 def smooth_normals(positions: Floats, triangles: NDArray[np.integer], shared: NDArray[np.integer]) -> Floats:
     """Unit normals (K, 3), each the mean of its triangles' normals weighted by their angles there.
 
@@ -258,8 +252,7 @@ def smooth_normals(positions: Floats, triangles: NDArray[np.integer], shared: ND
     with np.errstate(invalid="ignore", over="ignore"):
         normal, angles = normalize(np.nan_to_num(area_vectors(corner))), np.nan_to_num(corner_angles(corner))
         for i in range(3):
-            for axis in range(3):
-                total[:, axis] += np.bincount(shared[:, i], angles[:, i] * normal[:, axis], minlength=len(total))
+            total += sums_of(angles[:, i, None] * normal, shared[:, i], len(total))
     return normalize(total)
 
 
@@ -337,8 +330,7 @@ def _sums_within(vectors: Floats, faces: Floats, place: Indices, angle_deg: floa
         other = order[first[place[own]] + turn * count[place[own]] // met[own]]
         near = (faces[own // 3] * faces[other // 3]).sum(axis=1) >= np.cos(np.radians(angle_deg)) - 1e-6
         near |= own == other
-        for axis in range(3):
-            total[start:stop, axis] = np.bincount(own[near] - start, vectors[other[near], axis], stop - start)
+        total[start:stop] = sums_of(vectors[other[near]], own[near] - start, stop - start)
         start = stop
     return total
 
