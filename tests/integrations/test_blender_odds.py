@@ -47,6 +47,13 @@ def test_a_lamp_hidden_in_the_viewport_follows_its_parent(odds):
     assert box_of(face)[:, 1] == pytest.approx([9, 9]) and np.array(face.emission) == pytest.approx(40 / np.pi)
 
 
+def test_photometry_inside_the_blend_stays_in_the_folder(odds):
+    _, scene, folder = odds
+    (luminaire,) = (light for light in scene.lights if light.name == "inside")
+    assert luminaire.photometry.table.max() == 50 and not (folder / "out.ies").exists()
+    assert (folder / "odds.lambent/luminaires/out.ies").is_file()
+
+
 def test_wild_names_keep_their_settings_and_groups(odds):
     _, scene, _ = odds
     assert set(scene.light_fields) == WILD
@@ -58,6 +65,7 @@ def test_wild_names_keep_their_settings_and_groups(odds):
 def test_lost_things_are_said(odds):
     said = "\n".join(odds[1].warnings)
     assert "volume objects are left out: smoke" in said
+    assert "light thief: left out, it takes light away" in said and "light off: left out, it gives no light" in said
     assert "material noisy: the nodes of its colour are not carried" in said
 
 

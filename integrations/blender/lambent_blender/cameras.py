@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from .files import UniqueNames
 from .units import behind, upright
 
 MOST_KEYS = 120  # of a path
@@ -13,8 +14,8 @@ NARROWEST_DEG, WIDEST_DEG = 1.0, 150.0
 def cameras_of(scene, frame, depsgraph, note):
     """The [[cameras]] of a scene.toml, the active one first."""
     objects = sorted((o for o in scene.objects if o.type == "CAMERA"), key=lambda o: o is not scene.camera)
-    views = ((o.name, _checked_view(o, scene, frame, depsgraph, note)) for o in objects)
-    return [{"name": name, **view} for name, view in views if view is not None]
+    views, names = ((o.name, _checked_view(o, scene, frame, depsgraph, note)) for o in objects), UniqueNames()
+    return [{"name": names.unique(name), **view} for name, view in views if view is not None]
 
 
 def paths_of(scene, frame, depsgraph, note):
@@ -25,21 +26,22 @@ def paths_of(scene, frame, depsgraph, note):
         return []
     count = min(last - first + 1, MOST_KEYS)
     frames = [first + round(i * (last - first) / (count - 1)) for i in range(count)]
-    found, now = {o.name: [] for o in objects}, (scene.frame_current, scene.frame_subframe)
+    found, now = [(o, []) for o in objects], (scene.frame_current, scene.frame_subframe)
     try:
         for number in frames:
             scene.frame_set(number)
-            for o in objects:
-                found[o.name].append(_view(o, scene, frame, depsgraph))
+            for o, keys in found:
+                keys.append(_view(o, scene, frame, depsgraph))
     finally:
         scene.frame_set(now[0], subframe=now[1])
     per_second = scene.render.fps / scene.render.fps_base
     times = [(number - first) / per_second for number in frames]
     if len(frames) < last - first + 1:
         note(f"camera paths: {count} keys of {last - first + 1} frames")
+    names = UniqueNames()
     return [
-        {"name": name, "seconds": times[-1], "times_s": times, "keys": keys}
-        for name, keys in found.items()
+        {"name": names.unique(o.name), "seconds": times[-1], "times_s": times, "keys": keys}
+        for o, keys in found
         if any(key != keys[0] for key in keys)
     ]
 

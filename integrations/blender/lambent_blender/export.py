@@ -10,7 +10,7 @@ import bpy
 
 from .assigned import material_notes, materials_of
 from .cameras import cameras_of, paths_of
-from .files import Copies, missing_files
+from .files import Copies, UniqueNames, missing_files
 from .geometry import LOST, SOLID, Named, as_rendered, escaped, renderable, write_glb
 from .lamps import FACE, Lamps
 from .properties import WISHES, setting
@@ -99,24 +99,16 @@ def _lamps(shown, depsgraph, named, lamps):
     for one in depsgraph.object_instances:
         if one.is_instance and one.object.type == "LIGHT" and one.parent.original.name_full in names:
             placed.append((one.object.original, one.matrix_world.copy()))
-    taken = {name for parts in named.objects.values() for name, _ in parts}
+    taken = UniqueNames(name for parts in named.objects.values() for name, _ in parts)
     for o, matrix in placed:
         if o.hide_render or getattr(getattr(o.data, "cycles", None), "is_portal", False):
             continue
-        name = _free(" ".join("".join(c if c.isprintable() and c not in "#\\" else " " for c in o.name).split()), taken)
+        plain = "".join(c if c.isprintable() and c not in "#\\" else " " for c in o.name)  # as OBJ can hold it
+        name = taken.unique(" ".join(plain.split()) or "light")
         lamps.names.setdefault(o.name_full, []).append(name)
         lamps.add(name, o.data, matrix)
     lamps.finish()
     return lamps
-
-
-def _free(name, taken):
-    number, wanted = 1, name
-    while wanted in taken:
-        number += 1
-        wanted = f"{name}_{number}"
-    taken.add(wanted)
-    return wanted
 
 
 def _light_fields(shown, named):
@@ -131,7 +123,7 @@ def _wish(o):
 
 def _light_groups(scene, named, lamps, note):
     """Collections that are light groups, with their lamps and objects that emit light."""
-    found = []
+    found, names = [], UniqueNames()
     for collection in scene.collection.children_recursive:
         if not setting(collection, "lambent_light_group"):
             continue
@@ -143,7 +135,7 @@ def _light_groups(scene, named, lamps, note):
         elif len(found) == MOST_GROUPS:
             note(f"light group {collection.name}: left out, there are more than {MOST_GROUPS}")
         else:
-            found.append({"name": collection.name[:40], "members": members})
+            found.append({"name": names.unique(collection.name[:36]), "members": members})
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePath
 
 import bpy
 
@@ -42,15 +42,31 @@ class Copies:
     def write(self, name, content, into, source):
         """Name below the folder of a file with this content; the same source is written once."""
         if source not in self._taken:
-            target = self.folder / into / self._free(into, name)
+            target = self.folder / into / self._free(into, PurePath(name.replace("\\", "/")).name or "file")
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(content)
             self._taken[source] = target.relative_to(self.folder).as_posix()
         return self._taken[source]
 
     def _free(self, into, name):
-        taken, stem, number = {one.casefold() for one in self._taken.values()}, Path(name), 1
-        while f"{into}/{name}".casefold() in taken:
-            number += 1
-            name = f"{stem.stem}_{number}{stem.suffix}"
-        return name
+        taken, stem = {one.casefold() for one in self._taken.values()}, Path(name)
+        return free_name(stem.stem, lambda one: f"{into}/{one}{stem.suffix}".casefold() in taken) + stem.suffix
+
+
+def free_name(name, is_taken):
+    """`name`, or the first of name_2, name_3, ... that is not taken."""
+    number, wanted = 1, name
+    while is_taken(wanted):
+        number += 1
+        wanted = f"{name}_{number}"
+    return wanted
+
+
+class UniqueNames(set):
+    """Names that are taken."""
+
+    def unique(self, name):
+        """The name, or one with a number; it is taken from now on."""
+        found = free_name(name, self.__contains__)
+        self.add(found)
+        return found

@@ -45,17 +45,20 @@ class Lamps:
         if light.type != "SUN":
             power = self.frame.watts(power)
         tint = [a * b for a, b in zip(_colour(light), factor, strict=True)]
-        own = setting(light, "lambent_luminaire")
+        own, watts = setting(light, "lambent_luminaire"), [power * c for c in tint]
+        if not own and (min(watts) < 0 or not any(watts)):
+            self.note(f"light {name}: left out, it {'takes light away' if min(watts) < 0 else 'gives no light'}")
+            return
         file = self.copies.take(own or photometry, light, "luminaires", f"light {name}") if own or photometry else None
         if file is not None:
             self._luminaire(name, matrix, file, {} if own else {"scale": power * luminance(tint)}, tint)
         elif light.type == "AREA":
-            self._face(name, light, matrix, [power * c for c in tint])
+            self._face(name, light, matrix, watts)
         elif light.type == "SUN":
-            self._sun(name, light.angle, behind(matrix), [power * c for c in tint])
+            self._sun(name, light.angle, behind(matrix), watts)
         else:
             self.soft += light.shadow_soft_size > 0
-            self._lamp(name, light, matrix, [power * c / (4 * math.pi) for c in tint])
+            self._lamp(name, light, matrix, [w / (4 * math.pi) for w in watts])
 
     def finish(self):
         """The note on the sizes of all lamps."""
@@ -140,6 +143,8 @@ def _of_nodes(light, note):
         note("its nodes are not carried, but for plain emission and an IES texture")
         return [1.0, 1.0, 1.0], None
     factor = strength.default_value if ies is None else ies.inputs["Strength"].default_value
+    if ies is not None and not (ies.filepath if ies.mode == "EXTERNAL" else ies.ies):
+        note("its IES texture has no file")
     file = None if ies is None else ies.filepath if ies.mode == "EXTERNAL" else ies.ies
     return [factor * c for c in colour.default_value[:3]], file
 

@@ -16,8 +16,10 @@ READ = (".exr", ".hdr", ".png", ".jpg", ".jpeg")
 
 def environment_of(world, copies, note):
     """The [environment] of a scene.toml; None if it is black, or, with a note, cannot be carried."""
-    if world is None or world.node_tree is None:
+    if world is None:
         return None
+    if not world.use_nodes or world.node_tree is None:  # of Blender 4
+        return _constant(world.color)
     output = next(
         (n for n in world.node_tree.nodes if n.bl_idname == "ShaderNodeOutputWorld" and n.is_active_output), None
     )
@@ -27,17 +29,20 @@ def environment_of(world, copies, note):
     if background.bl_idname != "ShaderNodeBackground" or background.inputs["Strength"].is_linked:
         note("world: its nodes are not carried, but for one Background of a colour, a picture or a sky")
         return None
-    strength, colour = background.inputs["Strength"].default_value, background.inputs["Color"]
+    strength, colour = max(background.inputs["Strength"].default_value, 0.0), background.inputs["Color"]
     node = source(colour)
     if node is None:
-        radiance = [strength * c for c in colour.default_value[:3]]
-        return {"kind": "constant", "radiance": radiance} if any(radiance) else None
+        return _constant([strength * c for c in colour.default_value[:3]])
     if node.bl_idname == "ShaderNodeTexSky":
         return _sky(node, strength, note)
     if node.bl_idname == "ShaderNodeTexEnvironment":
         return _picture(node, strength, copies, note)
     note(f"world: a {node.name} is not carried")
     return None
+
+
+def _constant(radiance):
+    return {"kind": "constant", "radiance": list(radiance)} if any(radiance) else None
 
 
 def with_sun(environment, towards, irradiance, radius_rad, copies):

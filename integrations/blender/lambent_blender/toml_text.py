@@ -8,7 +8,7 @@ import json
 def toml_of(document):
     """The text of {key: value}: plain values first, then a table for each mapping, and for each item of a list of them.
 
-    Mappings in tables are inline. Numbers have the seven digits of Blender's floats.
+    Mappings in tables are inline. Numbers have ten digits: far from the origin, targets differ little from positions.
     """
     plain = {key: value for key, value in document.items() if not _is_tables(value)}
     parts = ["".join(f"{_key(key)} = {_value(value)}\n" for key, value in plain.items())]
@@ -42,7 +42,7 @@ def _value(value):
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float):
-        return repr(float(f"{value:.7g}"))
+        return repr(float(f"{value:.10g}"))
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{_key(key)} = {_value(one)}" for key, one in value.items()) + " }"
     if isinstance(value, list | tuple):

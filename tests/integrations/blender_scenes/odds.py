@@ -8,7 +8,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 import bpy
-from building import box, empty_scene, lamp, look, plane, put, truth
+from building import box, empty_scene, ies_node, lamp, look, plane, put, truth
 
 
 def build(folder: Path) -> dict:
@@ -49,10 +49,23 @@ def build(folder: Path) -> dict:
     top.children.link(group)
     put(group, "glow", box("glow"), (0, 9, 0)).data.materials.append(glow)
     group.objects.link(shy)
+    lamp(top, "thief", "POINT", -5.0)
+    lamp(top, "off", "AREA", 0.0)
+    inside = lamp(top, "inside", "POINT", 1.0, (0, 0, 2), shadow_soft_size=0)
+    _ies_text(inside.data)
     put(top, "smoke", bpy.data.volumes.new("smoke"))
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "odds.blend"))
     hidden.hide_viewport = False
     return truth(scene)
+
+
+def _ies_text(light):
+    """Photometry in a text of the .blend, with a name that leads out of the folder."""
+    text = bpy.data.texts.new("../../out.ies")
+    text.from_string("IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 3 1 1 2 0 0 0\n1 1 10\n0 90 180\n0\n50 50 50\n")
+    ies_node(light, "")
+    texture = next(n for n in light.node_tree.nodes if n.bl_idname == "ShaderNodeTexIES")
+    texture.mode, texture.ies = "INTERNAL", text
 
 
 def _boxes_on_points():
