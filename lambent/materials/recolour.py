@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 
-import numpy as np
-
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
-from lambent.core.light.colour import srgb_decode
-from lambent.core.plain import Triple, triple
+from lambent.core.light.colour import hex_colour
+from lambent.core.plain import Triple
 from lambent.materials.document import Material
 
 FIELD = "--recolour"
@@ -31,13 +28,6 @@ def parse_recolours(texts: Sequence[str]) -> dict[str, Triple]:
             raise UserError("names a material twice", field=FIELD, got=name.strip())
         found[name.strip()] = colour
     return found
-
-
-def hex_colour(text: str) -> Triple | None:
-    """Linear RGB of the sRGB colour #rrggbb; None for any other text."""
-    if not re.fullmatch(r"#[0-9a-fA-F]{6}", text):
-        return None
-    return triple(srgb_decode(np.frombuffer(bytes.fromhex(text[1:]), np.uint8) / 255))
 
 
 def recoloured(materials: Mapping[str, Material], colours: Mapping[str, Triple]) -> dict[str, Material]:

@@ -5,10 +5,13 @@ All functions take and return arrays (..., 3) and keep the dtype of floating inp
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
+from lambent.core.plain import Triple, triple
 
 # IEC 61966-2-1. The inverse is computed, not quoted: the round trip is exact up to rounding.
 RGB_TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
@@ -102,6 +105,13 @@ def srgb_decode(encoded: Floats) -> Floats:
 def hex_of(linear: Floats) -> str:
     """The sRGB colour #rrggbb of a linear one (3,), clipped to 0 and 1."""
     return "#" + np.round(255 * np.clip(srgb_encode(np.asarray(linear)), 0, 1)).astype(np.uint8).tobytes().hex()
+
+
+def hex_colour(text: str) -> Triple | None:
+    """Linear RGB of the sRGB colour #rrggbb; None for any other text."""
+    if not re.fullmatch(r"#[0-9a-fA-F]{6}", text):
+        return None
+    return triple(srgb_decode(np.frombuffer(bytes.fromhex(text[1:]), np.uint8) / 255))
 
 
 def filmic(linear: Floats, exposure_ev: float = 0.0) -> Floats:

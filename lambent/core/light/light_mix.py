@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from lambent.core.errors import UserError, did_you_mean
-from lambent.core.light.colour import XYZ_TO_RGB, hex_of, luminance, rgb_to_xyz, srgb_decode
+from lambent.core.light.colour import XYZ_TO_RGB, hex_colour, hex_of, luminance, rgb_to_xyz
 from lambent.core.light.observer import black_body_xyz
 from lambent.core.plain import Triple, triple
 
@@ -208,12 +208,10 @@ def _mix_of(value: str, text: str) -> GroupMix:
     for word in (part.strip() for part in value.split(",")):
         if word.lower() in ("on", "off"):
             kind, mix = "on", replace(mix, on=word.lower() == "on")
-        elif re.fullmatch(r"#[0-9a-fA-F]{6}", word):
-            kind = "colour"
-            if word == "#000000":
+        elif (colour := hex_colour(word)) is not None:
+            if not any(colour):
                 raise UserError("light colour cannot be black", field="--light", got=text, hint="use off")
-            encoded = np.array([int(word[i : i + 2], 16) for i in (1, 3, 5)]) / 255
-            mix = replace(mix, colour=triple(srgb_decode(encoded)))
+            kind, mix = "colour", replace(mix, colour=colour)
         elif re.fullmatch(r"[\d.]+[kK]", word):
             kind, mix = "temperature", replace(mix, temperature_k=_number(word[:-1], text))
         else:

@@ -11,10 +11,9 @@ from typing import Any
 import ipywidgets
 import numpy as np
 
-from lambent.core.light.colour import hex_of
+from lambent.core.light.colour import hex_colour, hex_of
 from lambent.materials.document import Material
 from lambent.materials.models.model import Parameter
-from lambent.materials.recolour import hex_colour
 from lambent.viewer.edits import in_words
 from lambent.viewer.look import MOST_EV
 from lambent.viewer.modes.walk import offers

@@ -14,7 +14,7 @@ from lambent.core.ceilings import SPECTRUM_BYTES, WAVELENGTHS
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import Floats
 from lambent.core.inputs import read_bytes
-from lambent.core.light.colour import XYZ_TO_RGB, srgb_decode
+from lambent.core.light.colour import XYZ_TO_RGB, hex_colour, srgb_decode
 from lambent.core.light.observer import black_body_xyz, observer
 from lambent.scenes.loaders.mitsuba.document import Document, Element
 
@@ -34,10 +34,10 @@ def colour_of(element: Element, document: Document, *, emitted: bool = False) ->
     if element.tag == "spectrum" and element.type:
         return _plugin(element, document, emitted)
     if text.startswith("#"):
-        digits = text[1:]
-        if len(digits) != 6 or any(c not in "0123456789abcdefABCDEF" for c in digits):
+        colour = hex_colour(text)
+        if colour is None:
             raise element.error("not a colour", got=text, expected="#rrggbb")
-        return srgb_decode(np.array([int(digits[i : i + 2], 16) for i in (0, 2, 4)]) / 255.0)
+        return np.array(colour)
     if ":" in text:
         return _spectrum(element, text, [pair.split(":") for pair in text.replace(",", " ").split()], emitted)
     if "filename" in element.attributes:

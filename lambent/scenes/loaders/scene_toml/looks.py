@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from lambent.core.errors import UserError
+from lambent.core.light.colour import hex_colour
 from lambent.core.light.light_mix import GroupMix, mix_of
 from lambent.materials.document import material_from
-from lambent.materials.recolour import hex_colour
 from lambent.scenes.loaders.scene_toml.assembly import check_material
 from lambent.scenes.loaders.scene_toml.material_files import LookFiles
 from lambent.scenes.looks.retexturing import texture_named, with_texture
