@@ -13,7 +13,7 @@ from lambent.baking.answering.rays import NOWHERE, RayEnds
 from lambent.baking.answering.spots import Spots
 from lambent.baking.running.tiles import seed_of
 from lambent.baking.surfaces.texels import Sides
-from lambent.core.arrays import Floats, Indices, sums_of
+from lambent.core.arrays import Flags, Floats, Indices, sums_of
 
 AROUND = 16  # texels that the rays of a point start from
 STRIDE = 8  # of the texels that viewers see, whose rays count for how important others are
@@ -102,28 +102,22 @@ def transfer_of(rays: Rays, patch: Indices, area: Floats, count: int) -> NDArray
 
 def patch_means(spots: Spots, clusters: Clusters, values: Floats) -> Floats:
     """(P, C) means over the area of each patch of values (2, K, C); over its lit texels where it has any."""
-    total, lit_total = np.zeros((2, clusters.count, values.shape[-1]))
-    area, lit_area = np.zeros((2, clusters.count))
-    for side in range(2):
-        for mask, sums, areas in ((spots.there, total, area), (spots.lit, lit_total, lit_area)):
-            mine = np.flatnonzero(mask[side] & (clusters.of[side] >= 0))
-            of, weight = clusters.of[side][mine], spots.area[mine]
-            areas += np.bincount(of, weight, clusters.count)
-            sums += sums_of(weight[:, None] * values[side, mine], of, clusters.count)
-    means = total / np.maximum(area, 1e-30)[:, None]
-    lit = lit_total / np.maximum(lit_area, 1e-30)[:, None]
+    means, _ = _means(spots, spots.there, clusters.of, values, clusters.count)
+    lit, lit_area = _means(spots, spots.lit, clusters.of, values, clusters.count)
     return np.where((lit_area > 0)[:, None], lit, means)
 
 
 def sender_means(spots: Spots, senders: Indices, values: Floats, count: int) -> Floats:
     """(count, C) means over area of values (2, K, C) of the lit texels for which each of `senders` (2, K) sends."""
-    total, area = np.zeros((count, values.shape[-1])), np.zeros(count)
-    for side in range(2):
-        mine = np.flatnonzero(spots.lit[side] & (senders[side] >= 0))
-        of, weight = senders[side][mine], spots.area[mine]
-        area += np.bincount(of, weight, count)
-        total += sums_of(weight[:, None] * values[side, mine], of, count)
-    return np.asarray(total / np.maximum(area, 1e-30)[:, None])
+    return _means(spots, spots.lit, senders, values, count)[0]
+
+
+def _means(spots: Spots, there: Flags, of: Indices, values: Floats, count: int) -> tuple[Floats, Floats]:
+    """Means (count, C) over area of values (2, K, C) of the texels that are `there`, by number `of` (2, K); areas."""
+    mine = there & (of >= 0)
+    weight = np.broadcast_to(spots.area, mine.shape)[mine]
+    area = np.asarray(np.bincount(of[mine], weight, count), float)
+    return sums_of(weight[:, None] * values[mine], of[mine], count) / np.maximum(area, 1e-30)[:, None], area
 
 
 def neighbouring_texels(spots: Spots, senders: Indices, points: GatherPoints, most: int = AROUND) -> Indices:
