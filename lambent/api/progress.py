@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from html import escape
 from typing import Any
 
 from lambent.core.interruption import was_interrupted
@@ -33,12 +34,12 @@ def _in_notebook() -> bool:
 
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
-    """A bar with the time left on stderr; if stderr is no terminal, a line for each step with its time.
+    """A bar with the time left on stderr; in a notebook one in the cell, else a line for each step with its time.
 
     Raises `KeyboardInterrupt` at the next step if a library has dropped the one of Ctrl-C.
     """
-    if not (sys.stderr.isatty() or _in_notebook()):
-        lines = StepLines()
+    if not sys.stderr.isatty():
+        lines = CellBar() if _in_notebook() else StepLines()
         try:
             yield _interruptible(lines)
         except BaseException:
@@ -103,3 +104,32 @@ class StepLines:
         if self.step and seconds >= self.SHORTEST_S:
             _say(f"{self.step}: {outcome}{seconds:.1f} s")
         self.step = ""
+
+
+class CellBar:
+    """One line in the cell of a notebook, for work of more than half a second: a bar, then the time it took."""
+
+    EVERY_S = 0.2
+
+    def __init__(self) -> None:
+        self.begun = self.said = time.monotonic()
+        self.shown: Any = None  # IPython's handle of the line
+
+    def __call__(self, done: float, total: float, what: str) -> None:
+        now, share = time.monotonic(), min(done / max(total, 1e-9), 1)
+        if now - self.said >= (StepLines.SHORTEST_S if self.shown is None else self.EVERY_S):
+            self.said = now
+            self._show(f"{what}: {share:.0%}, {now - self.begun:.0f} s", f"<progress value={share:.3f}></progress> ")
+
+    def end(self, outcome: str = "") -> None:
+        if self.shown is not None:
+            self._show(f"{outcome}{time.monotonic() - self.begun:.1f} s")
+
+    def _show(self, text: str, bar: str = "") -> None:
+        from IPython.display import display
+
+        line = {"text/plain": printable(text), "text/html": f"<small>{bar}{escape(printable(text))}</small>"}
+        if self.shown is None:
+            self.shown = display(line, raw=True, display_id=True)  # type: ignore[no-untyped-call]
+        else:
+            self.shown.update(line, raw=True)

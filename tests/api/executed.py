@@ -8,7 +8,7 @@ import nbformat
 from nbclient import NotebookClient
 
 ROOT = Path(__file__).parents[2]
-TIMEOUT_S = 300  # of a cell that hangs
+TIMEOUT_S = 120  # of a cell that hangs
 
 
 def executed(*cells, folder=ROOT):

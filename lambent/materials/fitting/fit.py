@@ -156,7 +156,7 @@ def fit(
                 other: dict[Side, Found] = {}
                 _fit_side(samples, side, task, _part_of(progress, 1, parts), other, retro=True)
                 tried.append(_choose(found, other, task))
-            if curves_too and any(found[side].models[0].lobes[-1].k > 0):
+            if curves_too and _mirrors(found[side]) and any(found[side].models[0].lobes[-1].k > 0):
                 one = _curve_of(found[side], side, task, _part_of(progress, parts - 1, parts))
                 taken, said = _worth(one, found[side], lobes)
                 tried.append(f"{side}: {said}")
@@ -223,6 +223,11 @@ def _check_curve(lobes: Lobes, fix: Fixed, ranges: Ranges, keep_albedo: bool) ->
         raise UserError("constrains lobes with numbers", field="keep_albedo", got="a curve lobe", hint="leave it out")
     for name in {*fix, *ranges} - {*CURVED}:
         raise UserError("is no number of a curve lobe", field=name, expected=", ".join(CURVED))
+
+
+def _mirrors(found: Found) -> bool:
+    """Whether a lobe of a side's models is about the mirror direction, or straight on, where a curve can take over."""
+    return any(not lobe.retro for model in found.models for lobe in model.lobes)
 
 
 def _curve_of(found: Found, side: Side, task: Task, progress: Progress) -> CurveFit:

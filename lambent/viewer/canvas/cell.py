@@ -13,6 +13,7 @@ from typing import Any
 import ipywidgets
 import numpy as np
 import wgpu
+from IPython.utils.capture import capture_output
 from numpy.typing import NDArray
 from rendercanvas.jupyter import RenderCanvas, loop
 
@@ -59,11 +60,12 @@ class Cell(Frames):
     mode: Walking
 
     def __init__(self, found: Opened, size: tuple[int, int]) -> None:
-        mode = Walking(found.state, found.input, found.pictures)
-        super().__init__(mode, RenderCanvas(size=size, max_fps=MAX_FPS), loop)
+        with capture_output():  # an empty line for errors, which goes below the controls
+            canvas = RenderCanvas(size=size, max_fps=MAX_FPS)
+        super().__init__(Walking(found.state, found.input, found.pictures), canvas, loop)
         self.closed, self._size, self._pictures = False, size, found.pictures
-        self.controls = Controls(mode.state, self.touched)
-        self.widget = ipywidgets.VBox([self.canvas, self.controls.widget])
+        self.controls = Controls(found.state, self.touched)
+        self.widget = ipywidgets.VBox([canvas, self.controls.widget, canvas._output_context])
         self._sent: NDArray[np.uint8] | None = None  # the picture that the browser has
         self._context = self.canvas.get_bitmap_context()
         self.canvas.add_event_handler(self._on_event, *EVENTS)

@@ -118,3 +118,9 @@ def test_alpha_and_kd_can_be_fixed() -> None:
     found = fit(measured(TAILED), lobes="curve", fix={"alpha": 0.1, "kd": (0.3, 0.2, 0.1)}).material
     assert found.kd == pytest.approx((0.3, 0.2, 0.1))
     assert found.lobes[0].alpha == pytest.approx(0.1, abs=1e-6)
+
+
+def test_a_tape_that_only_returns_light_gets_no_curve() -> None:
+    tape = Material(lobes=(Lobe(retro=True, mx=0.15, my=0.15, r0=0.8),))
+    found = fit(measured(tape), lobes="auto").material
+    assert [lobe.kind for lobe in found.lobes] == ["retro"]
