@@ -1,4 +1,4 @@
-"""Pages of the site that are made from the code when it is built: Python, commands, scene.toml; the home page."""
+"""What is made from the code when the site is built: the references, the home page, manuals."""
 
 from __future__ import annotations
 
@@ -50,16 +50,34 @@ def python_page() -> str:
 
 def commands_page() -> str:
     """The help of each command."""
+    parts = ["# Commands\n", "`man -M out/man lambent-bake` shows the same where the site was built.\n"]
+    parts += [f"## {name}\n\n```text\n{text}\n```\n" for name, text in helps().items()]
+    return "\n".join(parts)
+
+
+def helps() -> dict[str, str]:
+    """The help of each command, by name."""
     import typer
 
     from lambent.cli.main import build_app
 
     group: Any = typer.main.get_command(build_app())
-    parts = ["# Commands\n"]
-    for name, command in sorted(group.commands.items()):
-        context = typer.Context(command, info_name=f"lambent {name}", max_content_width=80, terminal_width=80)
-        parts.append(f"## {name}\n\n```text\n{command.get_help(context)}\n```\n")
-    return "\n".join(parts)
+    how = {"max_content_width": 80, "terminal_width": 80}
+    return {
+        name: command.get_help(typer.Context(command, info_name=f"lambent {name}", **how))
+        for name, command in sorted(group.commands.items())
+    }
+
+
+def on_post_build(config: Any) -> None:
+    """Write the manuals, man/man1/lambent-NAME.1 beside the site."""
+    folder = Path(config.site_dir).parent / "man" / "man1"
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in helps().items():
+        lines = text.replace("\\", "\\e").replace("-", "\\-").splitlines()
+        guarded = "\n".join("\\&" + line for line in lines)  # no line of the help is a request
+        head = f'.TH LAMBENT\\-{name.upper()} 1 "" Lambent\n.SH NAME\nlambent\\-{name}\n.SH DESCRIPTION\n.nf\n'
+        (folder / f"lambent-{name}.1").write_text(f"{head}{guarded}\n.fi\n", "utf-8")
 
 
 def scene_page() -> str:
