@@ -31,6 +31,8 @@ COARSE = DRAFT.changed(
     environment={"texels": 32},
     probe={"texels": 16, "samples": 1},
     answer={"patches": 48, "gather_rays": 64, "direct_samples": 8},
+    light_field={"points": 25, "texels": 30},
+    relighting={"depth": 2, "samples": 8, "paths": 8},
 )
 BRUSHED = Material(name="brushed", kd=0.05, lobes=(Lobe(k=0.9, mx=0.1, my=0.3, r0=0.9, alpha=0.5),))
 KEYS = [([0.4, 1.6, 1.4], [0.0, 1.0, -1.0]), ([-0.4, 1.5, 1.2], [0.2, 0.9, -1.0]), ([0.0, 1.4, 0.9], [0.0, 0.8, -1.0])]
@@ -80,7 +82,7 @@ members = ["lamp"]
 [[grids]]
 name = "desks"
 object = "floor"
-spacing_m = 0.8
+spacing_m = 1.5
 
 [[variants]]
 name = "evening"

@@ -1,7 +1,8 @@
 """Every command and every piece of Python in README and docs is run, page by page, or says why it is not.
 
 Lines run as they are written, in a folder of small files under the names that the pages use. What "preview" and
-"normal" mean is coarse here, and windows, which wait for a person, are opened by other tests.
+"normal" mean is coarse here, and pictures in reports are small. Windows, which wait for a person, are not opened: their
+own tests do that.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ import shlex
 import shutil
 import subprocess
 import tomllib
+from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from lambent.baking import bake as baking
@@ -26,11 +27,12 @@ ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 SHOWN = {"text", "wgsl", "json"}  # languages of blocks that nobody types
 SHELL = {"cp", "cat", "mkdir", "python"}
+PLACEHOLDER = re.compile(r"\b(SCENE|STORE|MEASUREMENT|MATERIAL\.json)\b")  # of a line that shows a form
 WINDOWS = {"walk", "view", "edit", "relight"}
 
 
 @pytest.fixture(scope="module")
-def reader(tmp_path_factory: pytest.TempPathFactory, mi: None) -> Path:
+def reader(tmp_path_factory: pytest.TempPathFactory, mi: None, adapter: None) -> Path:
     folder = tmp_path_factory.mktemp("reader")
     furnish(folder)
     bake_store(folder)
@@ -39,7 +41,8 @@ def reader(tmp_path_factory: pytest.TempPathFactory, mi: None) -> Path:
 
 @pytest.fixture
 def coarse(monkeypatch: pytest.MonkeyPatch) -> list[object]:
-    """Bakes are coarse, and windows are listed instead of opened."""
+    """Bakes and the previews of reports are coarse, and windows are listed instead of opened."""
+    from lambent.baking.reference import material_preview
     from lambent.viewer import app, edit
 
     opened: list[object] = []
@@ -48,6 +51,8 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> list[object]:
     monkeypatch.setattr(
         baking, "quality_named", lambda name: COARSE if name in ("preview", "normal") else quality_named(name)
     )
+    small = partial(material_preview.preview, size_px=32, spp=8)
+    monkeypatch.setattr(material_preview, "preview", small)
     return opened
 
 
@@ -104,5 +109,12 @@ def test_every_block_is_of_a_known_kind():
     unknown = [(page.name, b.line) for page in PAGES for b in blocks_of(page) if b.language not in kinds]
     assert not unknown
     commands = [block for page in PAGES for block in run_of(page) if block.language == "sh"]
-    assert len(commands) > 20 and all(block.commands for block in commands)
-    assert not np.any([block.about == "" for page in PAGES for block in blocks_of(page) if block.note])
+    assert len(commands) > 40 and all(block.commands for block in commands)
+
+
+def test_what_is_not_run_has_a_reason():
+    notes = [(page.name, b.line, b.about) for page in PAGES for b in blocks_of(page) if b.note == "not run"]
+    assert notes and not [note for note in notes if len(note[2].split()) < 2]
+    shown = [(page.name, b.line, b.text) for page in PAGES for b in blocks_of(page) if b.language == "text"]
+    typed = [block for block in shown if block[2].startswith("lambent ")]
+    assert not [block for block in typed if not PLACEHOLDER.search(block[2])]
