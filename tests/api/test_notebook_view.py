@@ -103,6 +103,21 @@ repr(view), after < before, len(children()) < after, moved.std() > 0
     assert shown["text/plain"] == "(\"View('box', closed)\", True, True, np.True_)"
 
 
+def test_without_an_adapter_it_says_so(baked_box):
+    shown = executed(
+        f"""
+import lambent, lambent.realtime.gpu.device, wgpu
+wgpu.gpu.enumerate_adapters_sync = lambda: []
+try:
+    lambent.open({str(baked_box)!r}).view()
+except lambent.UserError as error:
+    said = str(error)
+said
+"""
+    )
+    assert "no graphics adapter found; expected Vulkan" in shown[-1]["text/plain"]
+
+
 def test_a_missing_extra_is_a_line(baked_box, monkeypatch):
     monkeypatch.setitem(sys.modules, "ipywidgets", None)
     monkeypatch.delitem(sys.modules, "lambent.viewer.canvas.cell", raising=False)

@@ -53,7 +53,7 @@ def opened(
     `light_field_mb` is the GPU memory for light field maps, cached by a `policy` of `baked.light_fields.map_cache`;
     `sky_turn_deg` rotates the sky; `replaced` are meshes in place of objects (`scenes.replacement`); `fresh` leaves the
     store's session aside; the room is drawn on a `device`, by default its own. Without a `session`, none is read,
-    locked or written.
+    locked or written, nor is edited light baked beside the store.
     """
     store = Store.open(path)
     baked = with_replacements(read_baked(store, light_field_mb, policy), parse_replacements(replaced))
@@ -68,7 +68,7 @@ def opened(
     state.rebaking.possible = from_scene and sky_turn_deg % 360 == 0  # the light map keeps the sky as baked
     of_session = state.session.open([group.name for group in state.lights.groups], fresh=fresh)
     if not session:
-        state.session.fault = ""  # that nothing is kept is no fault
+        state.session.fault, state.rebaking.on = "", False  # that nothing is kept is no fault
     state.missing = (*baked.missing, *state.missing, *of_session, *restore(state))
     state.texturing.textures, state.texturing.without_uv = baked.textures, without_uv(baked)
     state.texturing.keeps = lambda: state.session.has_lock
