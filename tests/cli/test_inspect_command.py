@@ -133,3 +133,17 @@ def test_the_unit_of_the_polar_curve(lambent, downlight, tmp_path):
         assert lambent("inspect", path, "--plot", tmp_path / "p.svg").code == 0
         words = re.findall(r"<!-- (.*?) -->", (tmp_path / "p.svg").read_text())  # of which the outlines follow
         assert unit in words and max((word for word in words if word.isdigit()), key=int) == most, words
+
+
+def test_what_a_photometric_file_does_not_state_is_left_out(lambent):
+    sample = Path(__file__).parents[2] / "docs/tutorials/files/downlight.ies"
+    assert lambent("inspect", sample, "--json").json["lamp_sets"] == {"0": "1 x lamp, 18 W"}
+
+
+def test_objects_have_names(lambent, tmp_path):
+    """The first 60 for people, all for machines."""
+    boxes = "".join(f"o part_{n}\nv {n} 0 0\nv {n}.5 0 0\nv {n} 1 0\nf -3 -2 -1\n" for n in range(70))
+    (tmp_path / "many.obj").write_text(boxes)
+    assert len(lambent("inspect", tmp_path / "many.obj", "--json").json["object_names"]) == 70
+    said = lambent("inspect", tmp_path / "many.obj").out
+    assert "part_59 and 10 more" in said and "part_60" not in said

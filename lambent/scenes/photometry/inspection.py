@@ -30,7 +30,9 @@ def facts_of(luminaire: Luminaire) -> dict[str, Any]:
         **{name: getattr(luminaire, name) for name in ("format", "name", "maker", "report")},
         "photometry": "absolute" if luminaire.absolute else "relative to the lamps",
         "lamp_sets": {
-            str(k): f"{one.count} x {one.kind}, {one.lumens:g} lm, {one.watts:g} W, {one.colour}".rstrip(", ")
+            str(k): f"{one.count} x {one.kind or 'lamp'}, {one.lumens:g} lm, {one.watts:g} W, {one.colour}".replace(
+                ", 0 lm", ""
+            ).rstrip(", ")
             for k, one in enumerate(luminaire.sets)
         },
         "flux_lm": light.lumens,
