@@ -1,10 +1,12 @@
-"""Lamps that Lambent reads of Blender's files light a plate as Cycles does."""
+"""Lamps that Lambent reads of Blender's files light a plate, and a room, as Cycles does."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+import lambent
+from lambent.core.pictures.images import read_image
 from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import DirectionalLight, IesLight, Scene
 from tests.integrations.blender_scenes.ies import write_constant
@@ -35,3 +37,16 @@ def test_a_plate_is_lit_as_cycles_lights_it(blender, tmp_path):
     for name, value in measured.items():
         # 177.83 lm/W in Cycles, 179 here: luminaires keep their candela. Lamps of a size are soft nearby.
         assert found[name] == pytest.approx(value, rel=0.008 if name == "luminaire" else 0.004), name
+
+
+@pytest.mark.slow
+def test_a_room_looks_as_cycles_renders_it(blender, mi, tmp_path):
+    """Whole paths of both, over tiles of 10 x 10 pixels; glTF's plastic is not Principled's."""
+    blender("cornell", tmp_path)
+    store = lambent.bake(tmp_path / "cornell.blend", tmp_path / "cornell.store", only={"geometry"})
+    ours = store.render("eye", size=(120, 90), integrator="path", samples=128).radiance
+    cycles = read_image(tmp_path / "seen.exr")[..., :3]
+    tiles = [picture.reshape(9, 10, 12, 10, 3).mean(axis=(1, 3)) for picture in (ours, cycles)]
+    ratio = tiles[0] / tiles[1]
+    assert np.median(ratio, axis=(0, 1)) == pytest.approx(1, abs=0.015)
+    assert np.quantile(ratio, [0.1, 0.9]) == pytest.approx([1, 1], abs=0.07)
