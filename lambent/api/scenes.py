@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from lambent.api.describing import variants_in_words
 from lambent.api.materials import Material
-from lambent.api.progress import Wanted
 from lambent.core.views.camera import Camera
 from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Scene as Contents
 
 if TYPE_CHECKING:
-    from lambent.api.stores import Store
+    pass
 
 
 class Scene:
@@ -70,12 +69,6 @@ class Scene:
     @property
     def triangles(self) -> int:
         return sum(len(o.mesh.faces) for o in self.contents.objects)
-
-    def bake(self, folder: str | Path, *, quality: str = "preview", progress: Wanted = None, **options: Any) -> Store:
-        """Bake the scene into a store: `lambent.bake` of this scene."""
-        from lambent.api.bakes import bake
-
-        return bake(self, folder, quality=quality, progress=progress, **options)
 
     def __repr__(self) -> str:
         scene = self.contents

@@ -119,7 +119,7 @@ def test_the_wheel_works_outside_of_the_checkout(mi, tmp_path):
     assert data | extension <= names and not any(name.startswith(("tests/", "docs/")) for name in names)
     subprocess.run([*pip, "install", "--no-deps", "--target", tmp_path / "site", wheel], check=True)
     code = (
-        "import lambent; s = lambent.read('builtin:box').bake('box.store', only={'light_map'}, progress=True);"
+        "import lambent; s = lambent.bake('builtin:box', 'box.store', only={'light_map'}, progress=True);"
         "one, = s.illuminance(over='floor', spacing_m=.4, margin_m=.1, error=.1);"
         "print(lambent.__file__, one.facts()['mean_lx'])"
     )

@@ -55,7 +55,6 @@ Picture.facts(self)
 Picture.read(file)
 Picture.save(self, file)
 Picture.shown
-Scene.bake(self, folder, *, quality, progress, **options)
 Scene.cameras
 Scene.facts(self)
 Scene.materials
