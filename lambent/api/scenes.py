@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lambent.api.describing import variants_in_words
 from lambent.api.materials import Material
 from lambent.core.views.camera import Camera
 from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Scene as Contents
-
-if TYPE_CHECKING:
-    pass
 
 
 class Scene:

@@ -79,5 +79,5 @@ def test_a_window_needs_something_to_show(monkeypatch, tmp_path):
     with pytest.raises(lambent.UserError, match="is shown from its file"):
         lambent.window(lambent.Material(BRIGHT))
     monkeypatch.undo()
-    with pytest.raises(lambent.UserError, match="unknown mode.*walk"):
+    with pytest.raises(lambent.UserError, match=r"unknown mode.*walk"):
         lambent.window(tmp_path, "wlak")
