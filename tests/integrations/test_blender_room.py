@@ -12,6 +12,7 @@ from lambent.core.light.photometry import LM_PER_W
 from lambent.core.pictures.images import read_image
 from lambent.core.views.camera import clip_from_world
 from lambent.materials.document import Material
+from lambent.scenes.loaders.gltf.container import read
 from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import IesLight, ImageEnvironment
 from tests.integrations.blender_scenes.ies import write_constant
@@ -61,6 +62,15 @@ def test_modifiers_are_applied_and_hidden_things_left_out(room):
     _, scene = room
     assert len(scene.object("row").mesh.faces) == 4 * 12
     assert not [o.name for o in scene.objects if "hidden" in o.name or "excluded" in o.name]
+
+
+def test_linked_duplicates_share_their_mesh(room):
+    path = next(p for p in room[1].sources if p.suffix == ".glb")
+    document = read(path, None).document
+    meshes = {node.name: node.mesh for node in document.nodes if node.mesh is not None}
+    assert len({meshes[f"Stuhl/{i}"] for i in range(3)}) == 1
+    kits = [node.mesh for node in document.nodes if node.name == "floor"]
+    assert len(kits) == 3 and len(set(kits)) == 2
 
 
 def test_faces_look_outwards_after_the_change_of_axes(room):

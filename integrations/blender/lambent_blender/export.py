@@ -52,16 +52,17 @@ def export_scene(folder, name, context=None):
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with as_rendered(scene, view_layer, shown):
-            document = _document(scene, view_layer, shown, target.parent, name, notes.append)
+            depsgraph = context.evaluated_depsgraph_get()
+            document = _document(scene, depsgraph, shown, target.parent, name, notes.append)
         target.write_text(f"{MARK}\n{toml_of(document)}", "utf-8")
     except OSError as error:
         raise ExportError(f"{target.parent} cannot be written ({error.strerror})") from error
     return Exported(target, tuple(dict.fromkeys(notes)))
 
 
-def _document(scene, view_layer, shown, folder, name, note):
+def _document(scene, depsgraph, shown, folder, name, note):
     frame, copies = Frame(scene), Copies(folder, note)
-    geometry, depsgraph = folder / f"{name}.glb", view_layer.depsgraph
+    geometry = folder / f"{name}.glb"
     named = Named(write_glb(geometry))
     if not named.objects:
         raise ExportError(f"scene {scene.name} has nothing to export: its meshes have no faces")
