@@ -16,8 +16,8 @@ from lambent.materials.bsdf import MaterialBSDF, diffuse_seen, normalised, under
 from lambent.materials.document import COSINE_NODES, SHAPE_NODES, Lobe, Material, load_material, material_from
 from lambent.materials.lobes import NUMPY
 from lambent.materials.slope_curve import NODES_RHO, at_cosine, half_density, log_density, quantile
-from tests.tools.chi_square import assert_sampler
 from tests.tools.reciprocity import assert_reciprocal
+from tests.tools.samplers import assert_sampler
 
 RHO2 = NODES_RHO**2
 GGX = tuple(((1 + RHO2) ** -2).tolist())
@@ -113,8 +113,8 @@ def test_scaling_a_shape_changes_nothing() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("theta_deg", [0.0, 50.0, 85.0, 130.0])
 @pytest.mark.parametrize("name", MATERIALS)
-def test_samplers_follow_their_density(name: str, theta_deg: float, tmp_path) -> None:
-    assert_sampler(MaterialBSDF(MATERIALS[name]), theta_deg, 200.0, tmp_path)
+def test_samplers_follow_their_density(name: str, theta_deg: float) -> None:
+    assert_sampler(MaterialBSDF(MATERIALS[name]), theta_deg, 200.0)
 
 
 @pytest.mark.parametrize("name", MATERIALS)

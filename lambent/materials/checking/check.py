@@ -163,7 +163,7 @@ def sampler_failures(sampler: tuple[SamplerCheck, ...]) -> list[str]:
                 f"the density integrates to {one.pdf_integral:.4f} {where}, but the sampler accepts {kept:.4f} of "
                 "its samples"
             )
-        tolerance = 5 * one.albedo_error + INTEGRAL_LIMIT * one.albedo_quadrature
+        tolerance = 5 * one.albedo_error + INTEGRAL_LIMIT * max(one.albedo_quadrature, INTEGRAL_LIMIT)
         if abs(one.albedo_sampled - one.albedo_quadrature) > tolerance:
             both = f"{one.albedo_sampled:.4f} by sampling, {one.albedo_quadrature:.4f} by quadrature"
             found.append(f"albedo {both} {where}")

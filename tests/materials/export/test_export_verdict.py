@@ -23,7 +23,7 @@ from lambent.materials.measured import load
 from lambent.materials.measured.inspecting.metrics import METRICS
 from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, synthesise
 from tests.materials.export.export_materials import ALL
-from tests.tools.chi_square import LEVEL, sampler_test
+from tests.tools.samplers import assert_sampler
 
 RETRO = Lobe(retro=True, mx=0.03, my=0.03, r0=(1.0,) * 3, k=(0.4, 0.3, 0.2), alpha=-1.0)
 TAPE = Material(name="tape", kd=(0.3,) * 3, lobes=(Lobe(mx=0.2, my=0.2, r0=(0.05,) * 3), RETRO))
@@ -114,7 +114,7 @@ def test_directions_are_drawn_about_the_light_for_retro_reflectors_alone(lobes, 
 
 
 def test_samples_follow_their_density() -> None:
-    assert sampler_test(proposal_of(TAPES[1].measured(10.0)), 50.0, 20.0, samples=200_000).p_value > LEVEL
+    assert_sampler(proposal_of(TAPES[1].measured(10.0)), 50.0, 20.0, samples=200_000)
 
 
 PERFECT = dict.fromkeys(METRICS, 0.0)

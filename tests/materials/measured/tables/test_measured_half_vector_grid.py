@@ -12,7 +12,6 @@ from lambent.bench.scenes.retro_tapes import TAPES, Tape
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import FLIP_Z, direction, normalize
 from lambent.materials.bsdf import MaterialBSDF, components
-from lambent.materials.checking import check
 from lambent.materials.checking.check import check_sampler
 from lambent.materials.checking.chi_square import chi_square, combined
 from lambent.materials.document import Lobe, Material
@@ -27,6 +26,7 @@ from lambent.materials.measured.tables.half_vector_resampling import RetroGrid, 
 from lambent.materials.measured.tables.patch_sheet import TableBSDF, lookup_of, patch_sheet_of
 from tests.materials.export.formula_table import FormulaTable
 from tests.materials.measured.measured_files import about_n
+from tests.tools.samplers import assert_sampler
 
 
 @pytest.fixture(scope="module", params=TAPES, ids=lambda tape: tape.name)
@@ -414,10 +414,7 @@ def lit_from_above():
 
 @pytest.mark.parametrize("theta_deg", [0.0, 60.0, 120.0])
 def test_a_table_as_bsdf_passes_the_check_of_samplers(lit_from_above, theta_deg):
-    one = check.check_sampler(lit_from_above, theta_deg, 20.0, samples=200_000)
-    assert one.p_value > 1e-4
-    assert abs(one.pdf_integral + one.rejected_share - 1) < check.INTEGRAL_LIMIT
-    assert abs(one.albedo_sampled - one.albedo_quadrature) < 5 * one.albedo_error + 2e-3 * one.albedo_quadrature
+    assert_sampler(lit_from_above, theta_deg, 20.0, samples=200_000)
 
 
 def test_light_from_below_is_the_mirrored_pair(lit_from_above):
