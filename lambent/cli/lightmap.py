@@ -18,6 +18,8 @@ def command(
 ) -> None:
     """Write the light map for other programs: irradiance, W/m², and meshes with its coordinates as second uv set.
 
+    The direct light of the sun is not in it: renderers add that by shadow maps.
+
     Example: lambent lightmap room.store -o light.exr
     """
     import lambent

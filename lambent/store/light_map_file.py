@@ -43,35 +43,34 @@ def write_light_map(store: Store, image: Path) -> None:
 
 
 def _meshes(store: Store) -> bytes:
+    """All objects share four arrays of vertices and one of indices."""
     arrays = {name: store.read(f"geometry/{name}") for name in (*ATTRIBUTES, "faces")}
     arrays["uv"] = arrays["uv"] * (1, -1) + (0, 1)  # glTF has v down; uv2 has it already
-    views: list[np.ndarray[Any, Any]] = []
-    accessors: list[dict[str, Any]] = []
-
-    def add(array: np.ndarray[Any, Any], component: int, kind: str) -> int:
-        ends = {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()} if kind == "VEC3" else {}
-        described = {"bufferView": len(views), "componentType": component, "count": len(array), "type": kind}
-        accessors.append({**described, **ends})
-        views.append(array.astype("<f4" if component == FLOAT else "<u4"))
-        return len(accessors) - 1
-
+    parts = [array.astype("<u4" if name == "faces" else "<f4").tobytes() for name, array in arrays.items()]
+    starts = [0, *accumulate(map(len, parts))]
+    vertices: list[dict[str, Any]] = [
+        {"bufferView": i, "componentType": FLOAT, "count": len(arrays[name]), "type": f"VEC{arrays[name].shape[1]}"}
+        for i, name in enumerate(ATTRIBUTES)
+    ]
+    vertices[0] |= {"min": arrays["positions"].min(axis=0).tolist(), "max": arrays["positions"].max(axis=0).tolist()}
+    faces = {"bufferView": len(vertices), "componentType": UNSIGNED, "type": "SCALAR"}
     objects = whole_objects(scene_record(store).objects)
-    primitives = []
-    for o in objects:
-        used, corners = np.unique(arrays["faces"][o.first_face : o.first_face + o.face_count], return_inverse=True)
-        columns = {to: add(arrays[name][used], FLOAT, f"VEC{arrays[name].shape[1]}") for name, to in ATTRIBUTES.items()}
-        primitives.append({"attributes": columns, "indices": add(corners.ravel(), UNSIGNED, "SCALAR")})
-    sizes = [view.nbytes for view in views]
-    starts = [0, *accumulate(sizes)]
+    attributes = {to: i for i, to in enumerate(ATTRIBUTES.values())}
     document = {
         "asset": {"version": "2.0", "generator": "Lambent"}, "scene": 0,
         "scenes": [{"nodes": list(range(len(objects)))}],
         "nodes": [{"mesh": i, "name": o.name} for i, o in enumerate(objects)],
-        "meshes": [{"name": o.name, "primitives": [p]} for o, p in zip(objects, primitives, strict=True)],
-        "accessors": accessors,
+        "meshes": [
+            {"name": o.name, "primitives": [{"attributes": attributes, "indices": len(vertices) + i}]}
+            for i, o in enumerate(objects)
+        ],
+        "accessors": [
+            *vertices, *({**faces, "byteOffset": 12 * o.first_face, "count": 3 * o.face_count} for o in objects)
+        ],
         "bufferViews": [
-            {"buffer": 0, "byteOffset": a, "byteLength": n} for a, n in zip(starts, sizes, strict=False)
+            {"buffer": 0, "byteOffset": start, "byteLength": len(part)}
+            for start, part in zip(starts, parts, strict=False)
         ],
         "buffers": [{"byteLength": starts[-1]}],
     }  # fmt: skip
-    return glb_bytes(document, b"".join(view.tobytes() for view in views))
+    return glb_bytes(document, b"".join(parts))
