@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -46,12 +47,12 @@ def picture_of(file: Path, number: int) -> Path:
     return NOTEBOOKS / "pictures" / f"{file.stem}-{number}.jpg"
 
 
-def main() -> None:
-    """Execute the notebooks and keep the last picture of each cell."""
+def main(names: list[str]) -> None:
+    """Execute the notebooks of these names, by default all, and keep the last picture of each cell."""
     import nbformat
     from nbclient import NotebookClient
 
-    for file in sorted(NOTEBOOKS.glob("*.ipynb")):
+    for file in (NOTEBOOKS / f"{name}.ipynb" for name in names) if names else sorted(NOTEBOOKS.glob("*.ipynb")):
         notebook = nbformat.read(file, 4)
         with tempfile.TemporaryDirectory() as folder:
             NotebookClient(notebook, timeout=None, resources={"metadata": {"path": folder}}).execute()
@@ -73,4 +74,4 @@ def keep(picture: bytes, file: Path) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])
