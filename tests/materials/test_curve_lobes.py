@@ -16,8 +16,7 @@ from lambent.materials.bsdf import MaterialBSDF, diffuse_seen, normalised, under
 from lambent.materials.document import COSINE_NODES, SHAPE_NODES, Lobe, Material, load_material, material_from
 from lambent.materials.lobes import NUMPY
 from lambent.materials.slope_curve import NODES_RHO, at_cosine, half_density, log_density, quantile
-from tests.tools.reciprocity import assert_reciprocal
-from tests.tools.samplers import assert_sampler
+from tests.tools.checks import assert_reciprocal, assert_sampler
 
 RHO2 = NODES_RHO**2
 GGX = tuple(((1 + RHO2) ** -2).tolist())

@@ -13,8 +13,7 @@ from lambent.materials.bsdf import MaterialBSDF, components, coupling, selection
 from lambent.materials.checking.check import RECIPROCITY_LIMIT, check_sampler, reciprocity_error
 from lambent.materials.document import Lobe, Material, load_material, material_from
 from lambent.materials.lobes import fresnel
-from tests.tools.reciprocity import assert_reciprocal
-from tests.tools.samplers import assert_sampler
+from tests.tools.checks import assert_reciprocal, assert_sampler
 
 MIXTURES = {
     "diffuse": Material(kd=0.5, kt_d=0.3),

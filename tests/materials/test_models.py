@@ -16,10 +16,8 @@ from lambent.materials.fresnel import conductor, ior_of, r0_of, schlick
 from lambent.materials.models import model_named, models
 from lambent.materials.models.model import PROPERTIES, Model
 from lambent.published.merl_fits import MERL_CHANNELS, Published
-from tests.tools.furnace import assert_lossless, assert_passive
+from tests.tools.checks import assert_lossless, assert_passive, assert_reciprocal, assert_sampler
 from tests.tools.in_mitsuba import interaction
-from tests.tools.reciprocity import assert_reciprocal
-from tests.tools.samplers import assert_sampler
 from tests.tools.shader_parity import assert_parity, run_wgsl
 
 N = direction(0.0, 0.0)

@@ -4,52 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 
 from lambent.materials.bsdf import MaterialBSDF
-from tests.tools.in_mitsuba import f_cos, interaction, vectors
-
-
-class Scattering(Protocol):
-    """What the integrals need of a BSDF; `wi` to the light, `wo` to the viewer, (N, 3)."""
-
-    def eval(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-        """f (N, 3), without the cosine."""
-
-    def pdf(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-        """Density of `sample`, (N,)."""
-
-    def sample(self, wo: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Directions `wi` of random numbers (N, 3)."""
-
-
-@dataclass(frozen=True)
-class InMitsuba:
-    """A plugin of Mitsuba's without mirrors in it."""
-
-    plugin: Any
-
-    def eval(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-        return np.nan_to_num(f_cos(self.plugin, wi, wo)) / np.maximum(np.abs(wi[:, 2:]), 1e-6)
-
-    def pdf(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
-        import mitsuba as mi
-
-        return np.nan_to_num(np.array(self.plugin.pdf(mi.BSDFContext(), interaction(wo), vectors(wi)), dtype=float))
-
-    def sample(self, wo: np.ndarray, u: np.ndarray) -> np.ndarray:
-        return self.weighted(wo, u)[0]
-
-    def weighted(self, wo: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Samples `wi` and their weights f cos / pdf, (N, 3) each; mirrors are welcome here."""
-        import mitsuba as mi
-
-        u = u.astype(np.float32)
-        picked = np.ascontiguousarray(u[:, 1:].T)
-        one, weight = self.plugin.sample(mi.BSDFContext(), interaction(wo), mi.Float(u[:, 0]), mi.Point2f(picked))
-        return np.array(one.wo, dtype=float).T, np.array(weight, dtype=float).T
+from lambent.materials.checking.check import Scatters
 
 
 @dataclass(frozen=True)
@@ -83,7 +42,7 @@ def towards(theta_deg: float) -> np.ndarray:
     return np.array([np.sin(theta), 0.0, np.cos(theta)])
 
 
-def distance(theirs: Scattering, ours: MaterialBSDF, theta_deg: float, count: int = 20000) -> Distance:
+def distance(theirs: Scatters, ours: MaterialBSDF, theta_deg: float, count: int = 20000) -> Distance:
     """Distance seen from `theta_deg`; samples of both, and cosines on both sides, balanced."""
     random = np.random.default_rng(1)
     wo = np.broadcast_to(towards(theta_deg), (count, 3))
@@ -101,7 +60,7 @@ def distance(theirs: Scattering, ours: MaterialBSDF, theta_deg: float, count: in
     return Distance(*found)
 
 
-def peak(bsdf: Scattering, theta_deg: float) -> tuple[float, float]:
+def peak(bsdf: Scatters, theta_deg: float) -> tuple[float, float]:
     """Angle of the highest f in the plane of incidence, and the full width at half of it, degrees."""
     angles_deg = np.linspace(-80, 80, 3201)
     theta = np.radians(angles_deg)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -58,21 +58,36 @@ def square(folder: Path, bsdf: dict[str, Any], axes: np.ndarray, tangent: np.nda
     return mi.load_dict({"type": "scene", "s": {"type": "ply", "filename": str(folder / "square.ply"), "bsdf": bsdf}})
 
 
-def sampler_of(plugin: Any, wo: np.ndarray) -> tuple[Callable[..., np.ndarray], Callable[..., np.ndarray]]:
-    """`sample(u)` and `density(w)`, for `chi_square`, of a BSDF seen from `wo` (3,); rejected samples are (1, 0, 0)."""
-    import mitsuba as mi
+@dataclass(frozen=True)
+class InMitsuba:
+    """A plugin of Mitsuba's as `Scatters`; mirrors in it are seen by `weighted` alone."""
 
-    context = mi.BSDFContext()
+    plugin: Any
 
-    def sample(u: np.ndarray) -> np.ndarray:
-        si, u = interaction(np.tile(wo, (len(u), 1))), u.astype(np.float32)
-        bs, _ = plugin.sample(context, si, mi.Float(u[:, 0]), mi.Point2f(np.ascontiguousarray(u[:, 1:].T)))
-        return np.where(np.array(bs.pdf)[:, None] > 0, np.array(bs.wo).T, [1.0, 0.0, 0.0]).astype(float)
+    def eval(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+        return np.nan_to_num(f_cos(self.plugin, wi, wo)) / np.maximum(np.abs(wi[:, 2:]), 1e-6)
 
-    def density(w: np.ndarray) -> np.ndarray:
-        return np.array(plugin.pdf(context, interaction(np.tile(wo, (len(w), 1))), vectors(w)), float)
+    def pdf(self, wi: np.ndarray, wo: np.ndarray) -> np.ndarray:
+        import mitsuba as mi
 
-    return sample, density
+        return np.nan_to_num(np.array(self.plugin.pdf(mi.BSDFContext(), interaction(wo), vectors(wi)), dtype=float))
+
+    def sample(self, wo: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Samples `wi` (N, 3); rejected ones are (1, 0, 0)."""
+        one, _ = self._sampled(wo, u)
+        return np.where(np.array(one.pdf)[:, None] > 0, np.array(one.wo).T, [1.0, 0.0, 0.0]).astype(float)
+
+    def weighted(self, wo: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Samples `wi` and their weights f cos / pdf, (N, 3) each."""
+        one, weight = self._sampled(wo, u)
+        return np.array(one.wo, dtype=float).T, np.array(weight, dtype=float).T
+
+    def _sampled(self, wo: np.ndarray, u: np.ndarray) -> tuple[Any, Any]:
+        import mitsuba as mi
+
+        u = u.astype(np.float32)
+        picked = np.ascontiguousarray(u[:, 1:].T)
+        return self.plugin.sample(mi.BSDFContext(), interaction(wo), mi.Float(u[:, 0]), mi.Point2f(picked))
 
 
 def furnace_box(bsdf: dict[str, Any]) -> Any:

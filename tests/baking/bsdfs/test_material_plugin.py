@@ -8,10 +8,10 @@ import pytest
 from lambent.baking.bsdfs.material_plugin import material_dict
 from lambent.core.geometry.directions import direction
 from lambent.materials.bsdf import MaterialBSDF
-from lambent.materials.checking.chi_square import chi_square
 from lambent.materials.document import Lobe, Material
 from tests.materials.test_curve_lobes import KD_CURVE, curve_lobe
-from tests.tools.in_mitsuba import furnace_box, interaction, random_directions, sampler_of, square, vectors
+from tests.tools.checks import assert_sampler
+from tests.tools.in_mitsuba import InMitsuba, furnace_box, interaction, random_directions, square, vectors
 
 BRUSHED = Lobe(mx=0.3, my=0.07, k=(0.5, 0.6, 0.7), r0=(0.5, 0.6, 0.7), alpha=0.43)
 MATERIALS = {
@@ -58,8 +58,7 @@ def test_values_densities_and_samples_equal_numpy(mi, name):
 @pytest.mark.parametrize("name", ["retro", "curves", "mixture"])
 def test_samples_follow_the_density(mi, name):
     plugin = mi.load_dict(material_dict(MATERIALS[name]))
-    test = chi_square(*sampler_of(plugin, direction(np.radians(50), 0.4)), samples=400_000)
-    assert test.p_value > 1e-3 and test.pdf_integral + test.rejected_share == pytest.approx(1, abs=2e-3)
+    assert_sampler(InMitsuba(plugin), 50.0, 23.0, samples=400_000)
 
 
 def test_closed_box_of_albedo_and_emission_one_half_has_radiance_one(mi):

@@ -23,7 +23,7 @@ from lambent.materials.measured import load
 from lambent.materials.measured.inspecting.metrics import METRICS
 from lambent.materials.measured.inspecting.synthetic import ISOTROPIC, synthesise
 from tests.materials.export.export_materials import ALL
-from tests.tools.samplers import assert_sampler
+from tests.tools.checks import assert_sampler
 
 RETRO = Lobe(retro=True, mx=0.03, my=0.03, r0=(1.0,) * 3, k=(0.4, 0.3, 0.2), alpha=-1.0)
 TAPE = Material(name="tape", kd=(0.3,) * 3, lobes=(Lobe(mx=0.2, my=0.2, r0=(0.05,) * 3), RETRO))

@@ -26,7 +26,7 @@ from lambent.materials.measured.tables.half_vector_resampling import RetroGrid, 
 from lambent.materials.measured.tables.patch_sheet import TableBSDF, lookup_of, patch_sheet_of
 from tests.materials.export.formula_table import FormulaTable
 from tests.materials.measured.measured_files import about_n
-from tests.tools.samplers import assert_sampler
+from tests.tools.checks import assert_sampler
 
 
 @pytest.fixture(scope="module", params=TAPES, ids=lambda tape: tape.name)

@@ -17,7 +17,8 @@ from lambent.materials.fresnel import conductor
 from lambent.materials.measured.parts.spectral import rgb_of_spectra
 from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.loaders.mitsuba.fresnel import METALS
-from tests.tools.bsdf_distance import ByFormula, InMitsuba, distance, peak, towards
+from tests.tools.bsdf_distance import ByFormula, distance, peak, towards
+from tests.tools.in_mitsuba import InMitsuba
 
 ANGLES_DEG = (0, 30, 60, 75)
 

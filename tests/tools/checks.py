@@ -1,10 +1,29 @@
-"""White furnace: what comes back from a surface in uniform light of radiance 1."""
+"""Checks of `lambent materials check` as assertions."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from lambent.materials.checking.check import Scatters, furnace
+from lambent.materials.checking.check import (
+    RECIPROCITY_LIMIT,
+    Scatters,
+    check_sampler,
+    furnace,
+    reciprocity_error,
+    sampler_failures,
+)
+
+
+def assert_sampler(bsdf: Scatters, theta_deg: float, phi_deg: float, samples: int = 1_000_000) -> None:
+    """Fail where samples do not follow the density for this wo, or do not give the albedo of quadrature."""
+    found = sampler_failures((check_sampler(bsdf, theta_deg, phi_deg, samples=samples),))
+    assert not found, "; ".join(found)
+
+
+def assert_reciprocal(bsdf: Scatters) -> None:
+    """Fail where swapping the directions changes f."""
+    error = reciprocity_error(bsdf)
+    assert error <= RECIPROCITY_LIMIT, f"swapping wi and wo changes f by up to {error:.2g} of its value"
 
 
 def assert_passive(bsdf: Scatters, *, tolerance: float = 3e-3) -> None:
