@@ -85,17 +85,18 @@ fn main(@builtin(global_invocation_id) id: vec3u) {{
     let value: {TYPES[components]} = {expression};
     {chr(10).join(stores)}
 }}"""
-    values = _dispatch(shader, [*arrays.values(), *rows.values()], count * components, -(-count // GROUP))
+    values = dispatched(shader, [*arrays.values(), *rows.values()], count * components, -(-count // GROUP))
     return values if components == 1 else values.reshape(count, components)
 
 
-def _dispatch(shader: str, arrays: list[np.ndarray], size: int, groups: int) -> np.ndarray:
+def dispatched(shader: str, arrays: list[np.ndarray], size: int, groups: int) -> np.ndarray:
+    """(size,) float32 that a compute shader writes to its last binding; `arrays` are those before."""
     import wgpu
 
     device = gpu_device()
-    storage = wgpu.BufferUsage.STORAGE
-    buffers = [device.create_buffer_with_data(data=array.ravel(), usage=storage) for array in arrays]
-    result = device.create_buffer(size=size * 4, usage=storage | wgpu.BufferUsage.COPY_SRC)
+    use = wgpu.BufferUsage
+    buffers = [device.create_buffer_with_data(data=array.ravel(), usage=use.STORAGE | use.UNIFORM) for array in arrays]
+    result = device.create_buffer(size=size * 4, usage=use.STORAGE | use.COPY_SRC)
     pipeline = device.create_compute_pipeline(
         layout="auto", compute={"module": device.create_shader_module(code=shader), "entry_point": "main"}
     )

@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-import wgpu
 
 from lambent.materials.shader_layout import wgsl_dtype
 from lambent.realtime.gpu.shader_source import shader_files
 from lambent.realtime.gpu.structs import STRUCTS
-from tests.tools.shader_parity import gpu_device
+from tests.tools.shader_parity import dispatched
 
 WGSL = "\n".join(path.read_text() for _, path in sorted(shader_files().items()))
 
@@ -41,23 +40,7 @@ def test_every_field_is_read_where_it_was_written(name: str) -> None:
 @group(0) @binding(0) var<uniform> given: {name};
 @group(0) @binding(1) var<storage, read_write> out: array<u32>;
 @compute @workgroup_size(1) fn main() {{ {stores} }}"""
-    device = gpu_device()
-    use = wgpu.BufferUsage
-    given = device.create_buffer_with_data(data=words, usage=use.UNIFORM)
-    out = device.create_buffer(size=words.nbytes, usage=use.STORAGE | use.COPY_SRC)
-    pipeline = device.create_compute_pipeline(
-        layout="auto", compute={"module": device.create_shader_module(code=code), "entry_point": "main"}
-    )
-    entries = [{"binding": i, "resource": {"buffer": buffer}} for i, buffer in enumerate((given, out))]
-    group = device.create_bind_group(layout=pipeline.get_bind_group_layout(0), entries=entries)
-    encoder = device.create_command_encoder()
-    compute = encoder.begin_compute_pass()
-    compute.set_pipeline(pipeline)
-    compute.set_bind_group(0, group)
-    compute.dispatch_workgroups(1)
-    compute.end()
-    device.queue.submit([encoder.finish()])
-    read = np.frombuffer(device.queue.read_buffer(out), np.uint32)
+    read = dispatched(code, [words], len(words), 1).view(np.uint32)
     at = [word for _, word in found]
     assert len(set(at)) == len(at) >= 0.75 * len(words)
     np.testing.assert_array_equal(read[at], words[at])
