@@ -20,6 +20,8 @@ from lambent.materials.document import Lobe, Material
 from lambent.materials.measured.inspecting.synthetic import Setup, synthesise
 from lambent.materials.measured.parts.gonio_text import write_gonio
 from lambent.scenes.loaders.load import load_scene
+from lambent.store.kept.session import FILE as SESSION
+from lambent.store.kept.session import RoomState, WalkSession, write_session
 from lambent.store.kept.views import Views, change_views
 from tests.generated.rooms import adding_to, between, saved
 from tests.materials.measured.measured_files import merl_bytes
@@ -104,13 +106,13 @@ def furnish(folder: Path) -> None:
 
 
 def bake_store(folder: Path) -> None:
-    """Bake room.toml into room.store, with a saved view and a recorded walk; house.store is the same."""
+    """Bake room.toml into room.store, as a window leaves it: a saved view, a recorded walk, a stored state."""
     bake(load_scene(str(folder / "room.toml")), folder / "room.store", quality=COARSE, light_groups="scene").close()
     camera = load_scene(str(folder / "room.toml")).cameras[0]
     view = replace(camera, name="view 1")
     walk = CameraPath(name="walk 1", keys=(camera, view), seconds=0.1, times_s=(0.0, 0.1))
     change_views(folder / "room.store", lambda views: Views(cameras=(view,), paths=(walk,)))
-    shutil.copytree(folder / "room.store", folder / "house.store")
+    write_session(folder / "room.store" / SESSION, WalkSession(states={"before": RoomState()}))
 
 
 def _materials(folder: Path) -> None:
