@@ -70,10 +70,28 @@ def test_the_camera_is_that_of_the_open_frame(terrace):
     assert camera.position == pytest.approx(UPRIGHT @ truth["frames"]["13"][0] * INCH, abs=1e-5)
 
 
-def test_pictures_keep_their_light_in_every_state(blender, tmp_path):
+@pytest.fixture(scope="module")
+def pictures(blender, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pictures")
+    return blender("pictures", folder), folder
+
+
+def test_worlds_are_skies_colours_or_said_to_be_lost(pictures):
+    worlds, notes = pictures[0]["worlds"], "\n".join(pictures[0]["notes"])
+    assert worlds["grey"] == {"kind": "constant", "radiance": pytest.approx([0.3, 0.6, 0.9])}
+    sky = worlds["sky"]
+    towards = UPRIGHT @ [np.sin(2) * np.cos(0.5), np.cos(2) * np.cos(0.5), np.sin(0.5)]
+    assert sky["kind"] == "sunsky" and sky["sun_direction"] == pytest.approx(towards)
+    assert (sky["sky_scale"], sky["sun_scale"]) == (2, 2) and sky["sun_radius_deg"] == pytest.approx(np.degrees(0.01))
+    assert not any(worlds[name] for name in ("night", "noise", "tilted", "negative"))
+    for said in ("sun is below the horizon", "a Noise Texture is not carried", "turned about z only"):
+        assert said in notes
+
+
+def test_pictures_keep_their_light_in_every_state(pictures):
     """Floats are linear; bytes, on disk or not, are sRGB."""
-    found = blender("pictures", tmp_path)
-    assert found["files"].pop("missing") is None and found["notes"] == ["world: picture missing is missing: left out"]
+    found, tmp_path = pictures
+    assert found["files"].pop("missing") is None and found["notes"][0] == "world: picture missing is missing: left out"
     assert len(set(found["files"].values())) == 6
     for name, file in found["files"].items():
         value = np.array([0.5, 0.25, 1.0])

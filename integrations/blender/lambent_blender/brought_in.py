@@ -63,7 +63,8 @@ def imported(file):
 def _baked_look(name, image):
     """A material that emits irradiance over pi, as a white surface would, read at the second uv set."""
     look = bpy.data.materials.new(name)
-    look.use_nodes = True
+    if look.node_tree is None:  # of Blender 4
+        look.use_nodes = True
     nodes, links = look.node_tree.nodes, look.node_tree.links
     nodes.clear()
     kinds = ("UVMap", "TexImage", "Emission", "OutputMaterial")

@@ -69,6 +69,8 @@ def _tidy(document):
         for i in instances:
             nodes[i]["name"] = node["name"]
         repeated = [i for i in instances if own and not PLACES & nodes[i].keys() and _shape(document, nodes[i]) == own]
+        for i in repeated:
+            del nodes[i]["mesh"]
         kept = [i for i in children if i not in repeated]
         node.update({"children": kept} if kept else {})
 

@@ -46,11 +46,11 @@ class Lamps:
             power = self.frame.watts(power)
         tint = [a * b for a, b in zip(_colour(light), factor, strict=True)]
         own, watts = setting(light, "lambent_luminaire"), [power * c for c in tint]
-        if not own and (min(watts) < 0 or not any(watts)):
+        files = own or photometry
+        file = self.copies.take(files, light, "luminaires", f"light {name}", "Blender's lamp stays") if files else None
+        if not (own and file) and (min(watts) < 0 or not any(watts)):
             self.note(f"light {name}: left out, it {'takes light away' if min(watts) < 0 else 'gives no light'}")
-            return
-        file = self.copies.take(own or photometry, light, "luminaires", f"light {name}") if own or photometry else None
-        if file is not None:
+        elif file is not None:
             self._luminaire(name, matrix, file, {} if own else {"scale": power * luminance(tint)}, tint)
         elif light.type == "AREA":
             self._face(name, light, matrix, watts)
@@ -126,7 +126,7 @@ def _colour(light):
 
 def _of_nodes(light, note):
     """The factor (3,) of a lamp's Emission node, and the file or text of an IES texture that is its strength."""
-    if not (light.use_nodes and light.node_tree):
+    if light.node_tree is None or not getattr(light, "use_nodes", True):
         return [1.0, 1.0, 1.0], None
     output = next(
         (n for n in light.node_tree.nodes if n.bl_idname == "ShaderNodeOutputLight" and n.is_active_output), None

@@ -18,7 +18,7 @@ def environment_of(world, copies, note):
     """The [environment] of a scene.toml; None if it is black, or, with a note, cannot be carried."""
     if world is None:
         return None
-    if not world.use_nodes or world.node_tree is None:  # of Blender 4
+    if world.node_tree is None or not getattr(world, "use_nodes", True):  # of Blender 4
         return _constant(world.color)
     output = next(
         (n for n in world.node_tree.nodes if n.bl_idname == "ShaderNodeOutputWorld" and n.is_active_output), None

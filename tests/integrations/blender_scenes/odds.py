@@ -16,7 +16,7 @@ def build(folder: Path) -> dict:
     top = scene.collection
     text = bpy.data.curves.new("text", "FONT")
     text.body, text.extrude = "Ä", 0.1
-    put(top, "text", text, (0, 0, 1))
+    put(top, "text", text, (0, 0, 1))["lambent_light_field"] = True
     bent = bpy.data.curves.new("bent", "CURVE")
     bent.dimensions, bent.bevel_depth = "3D", 0.1
     spline = bent.splines.new("POLY")

@@ -15,13 +15,14 @@ SIZE, VALUE = (4, 2), (0.5, 0.25, 1.0, 1.0)
 
 def build(folder: Path) -> dict:
     from lambent_blender.files import Copies
-    from lambent_blender.surroundings import image_file
+    from lambent_blender.surroundings import environment_of, image_file
 
     empty_scene()
     notes: list[str] = []
     copies = Copies(folder, notes.append)
     found = {name: image_file(image, copies, "world") for name, image in _images(folder).items()}
-    return {"files": found, "notes": notes}
+    worlds = {name: environment_of(world, copies, notes.append) for name, world in _worlds().items()}
+    return {"files": found, "notes": notes, "worlds": worlds}
 
 
 def _images(folder: Path) -> dict:
@@ -36,6 +37,31 @@ def _images(folder: Path) -> dict:
     (folder / "packed later.png").unlink()
     made["missing"] = bpy.data.images.new("missing", *SIZE)
     made["missing"].source, made["missing"].filepath = "FILE", str(folder / "missing.tga")
+    return made
+
+
+def _worlds() -> dict:
+    """Worlds of one node before their Background, which has a strength of 2."""
+    made = {}
+    for name, kind in (("sky", "TexSky"), ("night", "TexSky"), ("noise", "TexNoise"), ("tilted", "TexEnvironment")):
+        made[name] = bpy.data.worlds.new(name)
+        made[name].use_nodes = True
+        nodes, links = made[name].node_tree.nodes, made[name].node_tree.links
+        node = nodes.new(f"ShaderNode{kind}")
+        nodes["Background"].inputs["Strength"].default_value = 2
+        links.new(node.outputs["Color"], nodes["Background"].inputs["Color"])
+        if kind == "TexSky":
+            node.sun_elevation, node.sun_rotation, node.sun_size = (0.5 if name == "sky" else -0.1), 2.0, 0.02
+        if name == "tilted":
+            node.image, mapping = _filled("tilted", float_buffer=True), nodes.new("ShaderNodeMapping")
+            mapping.inputs["Rotation"].default_value[0] = 0.3
+            links.new(nodes.new("ShaderNodeTexCoord").outputs["Generated"], mapping.inputs["Vector"])
+            links.new(mapping.outputs["Vector"], node.inputs["Vector"])
+    made["grey"], made["negative"] = bpy.data.worlds.new("grey"), bpy.data.worlds.new("negative")
+    for name, strength in (("grey", 3), ("negative", -1)):
+        made[name].use_nodes = True
+        inputs = made[name].node_tree.nodes["Background"].inputs
+        inputs["Color"].default_value, inputs["Strength"].default_value = (0.1, 0.2, 0.3, 1), strength
     return made
 
 
