@@ -15,7 +15,7 @@ from lambent.core.errors import UserError
 BLEND = ".blend"
 EXTENSION = "lambent_blender"
 ANSWER = "lambent: "  # begins the line with the extension's answer
-HINT = "install Blender 4.2 or newer so that `blender` starts it, or `pip install --no-deps bpy` in Python 3.11; or export glTF"
+HINT = "install Blender 4.2 or newer as `blender`, or `pip install --no-deps bpy` in Python 3.11; or export glTF"
 
 
 def exported(path: Path) -> tuple[Path, list[str]]:
