@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from lambent.api.materials import Material
 from lambent.api.pictures import Picture, jpeg_of
+from lambent.core.errors import UserError
 from lambent.core.light.light_mix import in_words
 from lambent.core.views.camera import Camera
 
@@ -50,7 +51,9 @@ class View:
 
     @property
     def picture(self) -> Picture:
-        """The picture as it is now: drawn in motion, traced at rest."""
+        """The picture as it is now: drawn in motion, traced at rest; a closed view raises `UserError`."""
+        if self._cell.closed:
+            raise UserError("is closed", field="view", hint="open another with `store.view()`")
         return Picture(self._cell.radiance, self.exposure_ev, self._state.look.display_transform)
 
     def close(self) -> None:

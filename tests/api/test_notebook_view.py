@@ -84,7 +84,7 @@ picture.radiance.shape, bool(abs(picture.shown.astype(int) - end.picture).mean()
     assert shown["text/plain"] == "((120, 160, 3), True)"
 
 
-def test_two_views_and_a_closed_one(run, mi):
+def test_two_views_and_closed_ones(run, mi):
     shown = run(
         """
 other = store.view("front", exposure_ev=view.exposure_ev + 1, size=(96, 64))
@@ -97,6 +97,12 @@ view.close(), view.close()
 moved = await there.after(lambda: there.drag((40, 30), (60, 30)))
 after = len(children())
 other.close()
+try:
+    other.picture
+except lambent.UserError as error:
+    assert str(error) == "view: is closed; open another with `store.view()`"
+else:
+    raise AssertionError("a closed view has no picture")
 repr(view), after < before, len(children()) < after, moved.std() > 0
 """
     )

@@ -125,7 +125,7 @@ def of_room(state: WalkState) -> Iterator[Control]:
     for offered in (partial(offers.variants, state.states), partial(offers.views, state)):
         if len(offered().acts) > 1:
             yield Choice(offered)
-    slider = ipywidgets.FloatSlider(min=-MOST_EV, max=MOST_EV, step=1 / 3, description="exposure, EV")
+    slider = ipywidgets.FloatSlider(min=-MOST_EV, max=MOST_EV, step=0.01, description="exposure, EV")
     yield Control(slider, lambda: state.look.exposure_ev, partial(setattr, state.look, "exposure_ev"))
     for group in state.lights.groups:
         slider = ipywidgets.FloatSlider(max=MOST_TIMES, step=0.01, description=group.name, tooltip="times as baked")
