@@ -53,20 +53,12 @@ def lit(light: IesLight, size: float = 4.0) -> Scene:
 
 def irradiance(scene: Scene, points: Floats, count: int = 1 << 15) -> Floats:
     """(n, 3) path traced at points of the floor."""
-    import drjit as dr
-    import mitsuba as mi
-
-    from lambent.baking.tracing import path_tracer
-    from lambent.baking.tracing.rays import block_sums, independent, vectors
     from lambent.baking.tracing.scene_builder import SceneBuilder
+    from tests.baking.tracing import facing_up
 
-    built = SceneBuilder(scene).build()
-    place = vectors(mi.Vector3f, np.repeat(points, count, axis=0))
-    up = mi.Vector3f(0, 1, 0) + dr.zeros(mi.Vector3f, len(points) * count)
-    sampler = independent(1, len(points) * count)
-    at = path_tracer.Points(place, up, up)
-    found = path_tracer.irradiance(built, sampler, at, sampler.next_2d(), sampler.next_2d(), 1)
-    return block_sums(found, count).astype(float) / count
+    at = facing_up.facing_up(np.repeat(points, count, axis=0))
+    found = facing_up.irradiance(SceneBuilder(scene).build(), at, 1, 1)
+    return found.reshape(len(points), count, 3).mean(axis=1)
 
 
 @pytest.mark.parametrize("name", OPENINGS)

@@ -13,13 +13,13 @@ from scipy.stats import chi2
 
 from lambent.baking.engine import engine
 from lambent.baking.sky.bins import BINS, SUB, SkyBins, alias_tables
-from lambent.baking.tracing import path_tracer
 from lambent.baking.tracing.lights.emitters import balance_emitters
 from lambent.baking.tracing.scene_builder import SceneBuilder, environment_dict
 from lambent.core.pictures.images import write_image
 from lambent.scenes.geometry import merge, patch
 from lambent.scenes.scene import ConstantEnvironment, ImageEnvironment, Scene, SceneObject
 from tests.baking.small_scenes import BLACK, plane
+from tests.baking.tracing.facing_up import facing_up, irradiance
 
 HALF = 0.25  # of the opening's side
 HIGH = 2.0
@@ -58,15 +58,9 @@ def built(scene: Scene, guided: bool = True) -> tuple[SceneBuilder, object]:
     return builder, builder.build()
 
 
-def irradiance(scene: object, at: tuple[float, float, float], n: int, seed: int = 0) -> np.ndarray:
+def direct(scene: object, at: tuple[float, float, float], n: int, seed: int = 0) -> np.ndarray:
     """n estimates of direct irradiance, green, on a floor at a point."""
-    sampler = mi.load_dict({"type": "independent"})
-    sampler.seed(seed, n)
-    up = mi.Vector3f(0, 1, 0) + dr.zeros(mi.Vector3f, n)
-    points = path_tracer.Points(mi.Point3f(*at) + dr.zeros(mi.Point3f, n), up, up)
-    return np.array(path_tracer.irradiance(scene, sampler, points, sampler.next_2d(), sampler.next_2d(), 1))[1].astype(
-        float
-    )
+    return irradiance(scene, facing_up(np.tile(at, (n, 1))), seed, 1)[:, 1]
 
 
 def form_factor(x: float, z: float) -> float:
@@ -118,7 +112,7 @@ def lit_pit() -> tuple[SceneBuilder, object]:
 
 @pytest.mark.parametrize("x", [0.0, 0.4, 1.5])
 def test_window_lights_as_its_form_factor(lit_pit: tuple[SceneBuilder, object], x: float) -> None:
-    values = irradiance(lit_pit[1], (x, 0.0, -x / 2), 1 << 15)
+    values = direct(lit_pit[1], (x, 0.0, -x / 2), 1 << 15)
     error = values.std() / np.sqrt(len(values))
     wanted = np.pi * form_factor(x, -x / 2)
     assert values.mean() == pytest.approx(wanted, abs=4 * error) and error < 0.05 * wanted
@@ -126,7 +120,7 @@ def test_window_lights_as_its_form_factor(lit_pit: tuple[SceneBuilder, object], 
 
 def test_window_is_sampled_with_a_fraction_of_the_variance(lit_pit: tuple[SceneBuilder, object]) -> None:
     plain = built(pit(ConstantEnvironment((1.0, 1.0, 1.0))), guided=False)[1]
-    variances = [irradiance(scene, (0.4, 0.0, 0.3), 1 << 15).var() for scene in (lit_pit[1], plain)]
+    variances = [direct(scene, (0.4, 0.0, 0.3), 1 << 15).var() for scene in (lit_pit[1], plain)]
     assert variances[0] < 0.15 * variances[1]
 
 
@@ -134,7 +128,7 @@ def test_small_bright_sun_is_neither_lost_nor_an_explosion(tmp_path: Path) -> No
     scene = pit(sunny(tmp_path))
     guided, plain = built(scene)[1], built(scene, guided=False)[1]
     for at in ((0.0, 0.0, 0.0), (0.66, 0.0, 0.2)):
-        ours, theirs = irradiance(guided, at, 1 << 16), irradiance(plain, at, 1 << 16, seed=1)
+        ours, theirs = direct(guided, at, 1 << 16), direct(plain, at, 1 << 16, seed=1)
         error = np.hypot(ours.std(), theirs.std()) / 256
         assert abs(ours.mean() - theirs.mean()) < 4 * error
         assert ours.var() < 2 * theirs.var(), at

@@ -11,9 +11,8 @@ import pytest
 from lambent.baking.photons.shooting import shoot
 from lambent.baking.sky.daylight import lone_emitter, radiance_from
 from lambent.baking.sky.sun import FoundSun, sun_in, sun_of
-from lambent.baking.tracing import path_tracer
 from lambent.baking.tracing.lights.sun import Sun, SunRays
-from lambent.baking.tracing.rays import array_of, independent, vectors
+from lambent.baking.tracing.rays import array_of, vectors
 from lambent.baking.tracing.scene_builder import SceneBuilder, environment_dict
 from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import normalize
@@ -22,6 +21,7 @@ from lambent.core.pictures.images import write_image
 from lambent.scenes.geometry import box, patch, placed
 from lambent.scenes.scene import DirectionalLight, ImageEnvironment, Scene, SceneObject, SunSky
 from tests.baking.small_scenes import GREY
+from tests.baking.tracing.facing_up import facing_up, irradiance
 
 pytestmark = pytest.mark.usefixtures("mi")
 H, W = 256, 512
@@ -136,19 +136,10 @@ def test_light_map_and_sun_add_up_to_all_light_on_the_floor(tmp_path: Path, numb
     rng = np.random.default_rng(number)
     count = 1 << 17
     p = np.column_stack([rng.uniform(-2, 2, count), np.zeros(count), rng.uniform(-2, 2, count)])
-    n = np.broadcast_to([0.0, 1.0, 0.0], p.shape)
-    points = path_tracer.Points(*(vectors(mi.Vector3f, v) for v in (p, n, n)))
-
-    def irradiance(unseen: Sun | None, seed: int) -> Floats:
-        sampler = independent(seed, count)
-        u = sampler.next_2d(), sampler.next_2d()
-        value = path_tracer.irradiance(whole, sampler, points, *u, 6, None, unseen)
-        return array_of(value).astype(float)
-
-    sun = Sun(found)
+    points, sun = facing_up(p), Sun(found)
     on_floor = SunRays(sun, whole).on(points.position, points.normal, points.flat, mi.Bool(True))
     direct = array_of(on_floor).astype(float)
-    rest, former = irradiance(sun, 1), irradiance(None, 2)
+    rest, former = irradiance(whole, points, 1, 6, sun), irradiance(whole, points, 2, 6)
     error = np.sqrt(((rest + direct).var(axis=0) + former.var(axis=0)) / count)
     assert np.all(direct.mean(axis=0) > 8 * error), "the sun is not too small to be missed"
     assert np.all(np.abs((rest + direct).mean(axis=0) - former.mean(axis=0)) < 4 * error)

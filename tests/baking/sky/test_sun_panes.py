@@ -12,9 +12,8 @@ import pytest
 
 from lambent.baking.photons.shooting import shoot
 from lambent.baking.sky.sun import sun_of
-from lambent.baking.tracing import path_tracer
 from lambent.baking.tracing.lights.sun import Sun, SunRays
-from lambent.baking.tracing.rays import array_of, independent, vectors
+from lambent.baking.tracing.rays import array_of, vectors
 from lambent.baking.tracing.scene_builder import SceneBuilder
 from lambent.core.arrays import Floats
 from lambent.materials.document import Lobe, Material
@@ -22,6 +21,7 @@ from lambent.scenes.geometry import box, patch, placed, sphere
 from lambent.scenes.scene import DirectionalLight, MaterialTextures, Mesh, Scene, SceneObject, Texture
 from tests.baking.sky.test_sun import TOWARDS, disc, environment_file
 from tests.baking.small_scenes import BLACK, GREY
+from tests.baking.tracing.facing_up import facing_up, irradiance
 
 pytestmark = pytest.mark.usefixtures("mi")
 IRRADIANCE = np.array([3.0, 2.0, 1.0])
@@ -115,17 +115,10 @@ def test_paths_leave_out_what_shadow_rays_bring(tmp_path: Path, glazing: str) ->
     scene = room(glazing, environment=environment_file(tmp_path, disc(TOWARDS, 3.0, 300.0)))
     rng, count = np.random.default_rng(1), 1 << 18
     p = np.column_stack([rng.uniform(-1.5, 1.0, count), np.zeros(count), rng.uniform(-1, 1.5, count)])
-    points = path_tracer.Points(*(vectors(mi.Vector3f, v) for v in (p, *[np.broadcast_to([0.0, 1, 0], p.shape)] * 2)))
-    whole = SceneBuilder(scene).build()
+    points, whole = facing_up(p), SceneBuilder(scene).build()
     sun, direct = sunlit(scene, p)
-
-    def traced(unseen: Sun | None, seed: int) -> Floats:
-        sampler = independent(seed, count)
-        u = sampler.next_2d(), sampler.next_2d()
-        return array_of(path_tracer.irradiance(whole, sampler, points, *u, 6, None, unseen)).astype(float)
-
-    rest = np.mean([traced(sun, seed) for seed in range(2)], axis=0)
-    former = np.mean([traced(None, 10 + seed) for seed in range(2)], axis=0)
+    rest = np.mean([irradiance(whole, points, seed, 6, sun) for seed in range(2)], axis=0)
+    former = np.mean([irradiance(whole, points, 10 + seed, 6) for seed in range(2)], axis=0)
     error = np.sqrt(((rest + direct).var(axis=0) + former.var(axis=0)) / count)
     assert (direct.mean(axis=0)[0] > 8 * error[0]) == (glazing != "frosted")
     assert np.all(np.abs((rest + direct).mean(axis=0) - former.mean(axis=0)) < 4 * error)

@@ -17,12 +17,12 @@ from lambent.baking.tracing.lights.emitters import balance_emitters
 from lambent.baking.tracing.lights.sun import Sun
 from lambent.baking.tracing.rays import array_of, independent, vectors
 from lambent.baking.tracing.scene_builder import SceneBuilder
-from lambent.core.arrays import Floats
 from lambent.core.geometry.directions import normalize
 from lambent.scenes.geometry import patch
 from lambent.scenes.scene import DirectionalLight, PointLight, Scene, SceneObject
 from tests.baking.sky.test_sun import SKY, TOWARDS, disc, environment_file, suns, wall_with_an_opening
 from tests.baking.small_scenes import BLACK, GREY
+from tests.baking.tracing.facing_up import facing_up, irradiance
 
 pytestmark = pytest.mark.usefixtures("mi")
 
@@ -52,14 +52,8 @@ def test_points_get_the_same_light_with_less_noise(tmp_path: Path, number: int, 
     whole, plain, beside = traced_scene(scene)
     rng, count = np.random.default_rng(number), 1 << 16
     p = np.column_stack([rng.uniform(-2, 2, count), np.zeros(count), rng.uniform(-2, 2, count)])
-    points = path_tracer.Points(*(vectors(mi.Vector3f, v) for v in (p, *[np.broadcast_to([0.0, 1, 0], p.shape)] * 2)))
-
-    def irradiance(unseen: Sun, seed: int) -> Floats:
-        sampler = independent(seed, count)
-        u = sampler.next_2d(), sampler.next_2d()
-        return array_of(path_tracer.irradiance(whole, sampler, points, *u, 3, None, unseen)).astype(float)
-
-    former, found = irradiance(plain, 1), irradiance(beside, 2)
+    points = facing_up(p)
+    former, found = irradiance(whole, points, 1, 3, plain), irradiance(whole, points, 2, 3, beside)
     error = np.sqrt((former.var(axis=0) + found.var(axis=0)) / count)
     assert np.all(np.abs(found.mean(axis=0) - former.mean(axis=0)) < 4 * error)
     if not others:
