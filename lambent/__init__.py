@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from lambent.api.reading import open as open
     from lambent.api.reading import read as read
     from lambent.api.scenes import Scene as Scene
+    from lambent.api.sites import export as export
     from lambent.api.stores import Store as Store
     from lambent.api.tables import Fit as Fit
     from lambent.api.tables import Table as Table
@@ -40,8 +41,8 @@ _MODULES = {
     "Comparison": "api.pictures", "Fit": "api.tables", "Interreflection": "api.bakes", "Material": "api.materials",
     "Picture": "api.pictures", "Scene": "api.scenes", "Store": "api.stores", "Table": "api.tables",
     "UserError": "core.errors", "View": "api.views", "bake": "api.bakes", "check": "api.checking",
-    "compare": "api.pictures", "convert": "api.converting", "glare": "api.glare", "open": "api.reading",
-    "propose": "api.bakes", "read": "api.reading", "run_bench": "api.benches",
+    "compare": "api.pictures", "convert": "api.converting", "export": "api.sites", "glare": "api.glare",
+    "open": "api.reading", "propose": "api.bakes", "read": "api.reading", "run_bench": "api.benches",
     "window": "api.windows",
 }  # fmt: skip
 __all__ = ["__version__", *_MODULES]

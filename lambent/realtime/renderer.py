@@ -25,6 +25,7 @@ from lambent.core.progress import Progress, silent
 from lambent.materials.lobes import widths
 from lambent.realtime.display.display import SmoothPass, TonemapPass
 from lambent.realtime.frame_state import LIGHT_MAP_NOISE, QMC_N, SHOW, FrameState, frame_data
+from lambent.realtime.gpu.commands import Commands
 from lambent.realtime.gpu.layouts import Layouts
 from lambent.realtime.gpu.structs import FRAME_DTYPE, Record
 from lambent.realtime.gpu.targets import PassTimer, Targets, pixels
@@ -113,13 +114,32 @@ class Renderer:
         encoded and smoothed. Returns before the GPU is done: see `finish`.
         """
         started = time.perf_counter()
-        encoder = self.device.create_command_encoder()
-        context = self._frame_context(encoder, state, target_view)
-        self._encode(context)
+        encoder, commands = self.device.create_command_encoder(), Commands()
+        radiance = self.frame(state, commands, target_view)
+        commands.encode(encoder)
         self._timer.resolve(encoder)
         self.device.queue.submit([encoder.finish()])
         self._counts["encode_ms"] = (time.perf_counter() - started) * 1e3
+        return radiance
+
+    def frame(self, state: FrameState, commands: Commands, target_view: Any = None, *, whole: bool = False) -> Any:
+        """Write the passes of a frame into `commands`; returns the texture of linear radiance that they leave.
+
+        `whole`: with the faces out of view, for other cameras.
+        """
+        context = self._frame_context(commands, state, target_view)
+        context.whole = whole
+        self._encode(context)
         return context.radiance
+
+    @property
+    def frame_buffer(self) -> Any:
+        """The buffer of the record that all passes of a frame read (FRAME_DTYPE)."""
+        return self._frame_buffer
+
+    def target(self, name: str, size: tuple[int, int]) -> Any:
+        """The texture of a display image, of (width, height)."""
+        return self._targets.display(name, size)
 
     @property
     def light_version(self) -> int:

@@ -82,6 +82,10 @@ class Clusters:
         """
         return self._runs(self._visible(clip_from_world) & among)
 
+    def whole(self, among: Flags | bool = True) -> Seen:
+        """All clusters of those `among`, for a frame that any camera may look at."""
+        return self._runs(np.ones(len(self._begin), bool) & among)
+
     def _visible(self, clip_from_world: Floats) -> Flags:
         x, y, z, w = np.asarray(clip_from_world, np.float64)
         planes = np.array([w + x, w - x, w - y, y + w, z, w - z]).T

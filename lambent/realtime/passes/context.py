@@ -42,6 +42,7 @@ class FrameContext:
     light: tuple[Any, ...] = ()  # resources of group 3: light maps, the sun, and its visible share by pixel
     pane_light: tuple[Any, ...] = ()  # `light` for panes
     reflections: Any = None  # group 3 of draws with pixels on planar reflectors
+    whole: bool = False  # faces out of view are drawn too
 
     @property
     def is_passing(self) -> bool:
@@ -70,6 +71,8 @@ class FrameContext:
 
     def seen(self, among: Flags | bool = True) -> Seen:
         """The clusters, of those `among` which it looks, that the frame's camera may see."""
+        if self.whole:
+            return self.clusters.whole(among)
         return self.clusters.seen(self.data["clip_from_world"].T, among)
 
     def thin(self) -> Seen:

@@ -1,0 +1,130 @@
+"""`lambent export`: a store as a folder that any static host serves."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lambent.core.errors import UserError
+from lambent.core.files import write_text
+from lambent.core.light.exposure import metered
+from lambent.core.progress import Progress, silent
+from lambent.core.views.camera import Camera
+from lambent.realtime.frame_state import FrameState, frame_data
+from lambent.realtime.gpu.commands import Commands
+from lambent.realtime.gpu.described import DescribedDevice
+from lambent.realtime.gpu.device import open_device
+from lambent.realtime.gpu.structs import FRAME_DTYPE
+from lambent.realtime.light.baked import read_baked
+from lambent.realtime.renderer import Renderer
+from lambent.realtime.resources import device_needs
+from lambent.site.manifest import Manifest
+from lambent.store.kept.views import read_views
+from lambent.store.store import Store
+
+FORMAT, VERSION = "lambent-site", 1
+SIZE = 640, 360  # of the frame that is described; the page's follows its canvas
+POSTER = 1280, 720  # a picture for browsers without WebGPU, and while the room loads
+DISPLAY = "site"
+
+
+def export(store: Store, folder: Path, progress: Progress = silent) -> dict[str, Any]:
+    """Write a site of a baked scene; returns its figures: bytes, files, pipelines.
+
+    Parameters
+    ----------
+    store : Store
+    folder : Path
+        New, empty, or a site that is replaced.
+
+    Raises
+    ------
+    UserError
+        If the folder holds something else, the scene has no camera, or there is no graphics adapter.
+    """
+    _check(folder)
+    baked = read_baked(store)
+    if not baked.record.cameras:
+        raise UserError("has no camera", file=store.folder, hint="add [[cameras]] to its scene.toml")
+    folder.mkdir(parents=True, exist_ok=True)
+    device = DescribedDevice(open_device(device_needs(baked)))
+    renderer = Renderer(device, baked)
+    saved = read_views(store.folder).cameras
+    cameras = [*baked.record.cameras, *(one for one in saved if one.name not in {c.name for c in baked.record.cameras})]
+    state = FrameState(cameras[0], *SIZE, planar="off")
+    shown, commands = renderer.target(DISPLAY, SIZE).create_view(), Commands()
+    renderer.frame(state, commands, shown, whole=True)
+    renderer.draw(state, shown)  # what uploads lazily is on the GPU now
+    manifest = Manifest(device, folder, SIZE, shown)
+    passes = manifest.passes(commands)
+    exposure_ev = baked.record.exposure_ev
+    if exposure_ev is None:
+        exposure_ev = metered(renderer.image(state)) or 0.0
+    document = {
+        "format": FORMAT, "version": VERSION, "name": baked.record.name, "cameras": [_camera(one) for one in cameras],
+        "bounds": np.asarray(baked.record.bounds).tolist(), "exposureEv": exposure_ev, "unit": baked.unit,
+        "frame": _frame(manifest.refer(renderer.frame_buffer), state, baked.record.bounds),
+        "tables": manifest.tables, "passes": passes,
+    }  # fmt: skip
+    _write_poster(renderer, replace(state, exposure_ev=exposure_ev, planar="auto"), folder / "poster.jpg")
+    write_text(folder / "manifest.json", json.dumps(document, separators=(",", ":"), allow_nan=False))
+    _copy_page(folder)
+    return {
+        "written": folder, "bytes": sum(manifest.chunks.files.values()), "files": len(manifest.chunks.files),
+        "pipelines": len(manifest.tables["render_pipeline"]),
+    }  # fmt: skip
+
+
+def _check(folder: Path) -> None:
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise UserError("is no folder", file=folder, expected="a folder for the site")
+    if any(folder.iterdir()):
+        try:
+            ours = json.loads((folder / "manifest.json").read_text("utf-8")).get("format") == FORMAT
+        except (OSError, ValueError, AttributeError):
+            ours = False
+        if not ours:
+            raise UserError("holds other files than a site", file=folder, hint="choose a new folder")
+        for part in ("data", "shaders"):
+            shutil.rmtree(folder / part, ignore_errors=True)
+
+
+def _write_poster(renderer: Renderer, state: FrameState, file: Path) -> None:
+    from PIL import Image
+
+    width, height = POSTER
+    Image.fromarray(renderer.still(replace(state, width=width, height=height))).save(file, quality=85)
+
+
+def _camera(one: Camera) -> dict[str, Any]:
+    return {
+        "name": one.name, "position": one.position, "target": one.target, "up": one.up, "fovYDeg": one.fov_y_deg
+    }  # fmt: skip
+
+
+def _frame(place: int, state: FrameState, bounds: Any) -> dict[str, Any]:
+    """The uniform of a frame: its buffer, its bytes in a fresh frame, and where the camera's fields are."""
+    data = frame_data(state, bounds)
+    fields: Any = FRAME_DTYPE.fields
+    of_camera = ("clip_from_world", "eye", "across", "up", "forward", "exposure")
+    low, high = np.asarray(bounds)
+    near_m = float(np.clip(1e-4 * np.linalg.norm(high - low), 1e-3, 0.1))
+    return {
+        "buffer": place, "bytes": list(data.tobytes()), "nearM": near_m,
+        "offsets": {name: fields[name][1] for name in of_camera},
+    }  # fmt: skip
+
+
+def _copy_page(folder: Path) -> None:
+    with as_file(files("lambent.site").joinpath("page")) as page:
+        for file in page.iterdir():
+            if file.suffix in (".html", ".js", ".css"):
+                shutil.copyfile(file, folder / file.name)

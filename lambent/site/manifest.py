@@ -1,0 +1,141 @@
+"""The manifest of a site: the objects of WebGPU that a frame is made of, and its passes, as JSON.
+
+Objects of each kind are lists; others name them by their place. Keys and values are those of WebGPU's descriptors, so
+that the page passes them on as they are.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+from lambent.realtime.gpu.commands import Commands, RenderPass
+from lambent.realtime.gpu.described import DescribedDevice, Made
+from lambent.realtime.gpu.pipelines import VERTEX_FLOATS
+from lambent.realtime.gpu.read_back import TEXELS, buffer_bytes, texture_levels
+from lambent.site.chunks import Chunks, Packing
+
+VERTEX, INDEX = 0x20, 0x10  # usages of buffers
+FACES = 6  # of a cube
+CANVAS = "canvas"  # stands for the texture that is shown, and for the size of textures that follow it
+
+
+class Manifest:
+    """Gathers what a frame is made of."""
+
+    def __init__(self, device: DescribedDevice, folder: Path, size: tuple[int, int], shown: Any) -> None:
+        """`shown` is the view of the display image, of `size`."""
+        self._device, self._folder, self._size, self._shown = device, folder, size, shown
+        self.chunks = Chunks(folder)
+        self.tables: dict[str, list[Any]] = defaultdict(list)
+        self._places: dict[int, int] = {}
+        self._drawn: set[int] = set()  # textures that the frame draws into
+
+    def passes(self, commands: Commands) -> list[dict[str, Any]]:
+        """The passes of a frame."""
+        views = [view for one in commands.passes for view in _attached(one)]
+        self._drawn = {id(self._device.made[id(view)].descriptor["texture"]) for view in views}
+        return [self._pass(one) for one in commands.passes]
+
+    def refer(self, one: Any) -> int:
+        """The place of an object in the list of its kind."""
+        made = self._device.made[id(one)]
+        if id(one) not in self._places:
+            described = getattr(self, f"_{made.kind}")(made)
+            table = self.tables[made.kind]
+            self._places[id(one)] = len(table)
+            table.append(described)
+        return self._places[id(one)]
+
+    def _pass(self, one: RenderPass) -> dict[str, Any]:
+        colours = [{**_camel(a), "view": self._view_or_canvas(a["view"])} for a in one.attachments["color_attachments"]]
+        depth = one.attachments.get("depth_stencil_attachment")
+        found: dict[str, Any] = {"colorAttachments": colours}
+        if depth is not None:
+            found["depthStencilAttachment"] = {**_camel(depth), "view": self.refer(depth["view"])}
+        found["commands"] = [[_word(name), *map(self._argument, given)] for name, given in one.commands]
+        return found
+
+    def _view_or_canvas(self, view: Any) -> int | str:
+        return CANVAS if view is self._shown else self.refer(view)
+
+    def _argument(self, one: Any) -> Any:
+        return self.refer(one) if id(one) in self._device.made else one
+
+    def _buffer(self, made: Made) -> dict[str, Any]:
+        data, usage = buffer_bytes(self._device, made.one), made.descriptor["usage"]
+        channels = VERTEX_FLOATS if usage & VERTEX else 3 if usage & INDEX else 1
+        packing = Packing(4, channels, [(len(data) // 4, 0)]) if len(data) % (4 * channels) == 0 else None
+        return {"usage": usage, "size": len(data), "data": self.chunks.add(data, packing)}
+
+    def _texture(self, made: Made) -> dict[str, Any]:
+        size, drawn = tuple(made.one.size), id(made.one) in self._drawn
+        follows = drawn and size[:2] == self._size
+        found = {
+            **_camel(made.descriptor), "size": [CANVAS, CANVAS, *size[2:]] if follows else list(size),
+            "format": made.one.format,
+        }  # fmt: skip
+        return found if drawn else {**found, "data": self._texels(made.one)}
+
+    def _texels(self, texture: Any) -> dict[str, Any]:
+        levels = texture_levels(self._device, texture)
+        if texture.format not in TEXELS:
+            return self.chunks.add(b"".join(levels))
+        word, channels = TEXELS[texture.format]
+        layers = texture.size[2]
+        runs = [(len(level) // word, len(level) // word // layers * FACES if layers > FACES else 0) for level in levels]
+        return self.chunks.add(b"".join(levels), Packing(word, channels, runs))
+
+    def _view(self, made: Made) -> dict[str, Any]:
+        descriptor = {key: value for key, value in made.descriptor.items() if key != "texture"}
+        return {"texture": self.refer(made.descriptor["texture"]), **_camel(descriptor)}
+
+    def _sampler(self, made: Made) -> dict[str, Any]:
+        return dict(_camel(made.descriptor))
+
+    def _bind_group_layout(self, made: Made) -> dict[str, Any]:
+        return dict(_camel(made.descriptor))
+
+    def _bind_group(self, made: Made) -> dict[str, Any]:
+        entries = []
+        for entry in made.descriptor["entries"]:
+            one = entry["resource"]["buffer"] if isinstance(entry["resource"], dict) else entry["resource"]
+            entries.append({"binding": entry["binding"], self._device.made[id(one)].kind: self.refer(one)})
+        return {"layout": self.refer(made.descriptor["layout"]), "entries": entries}
+
+    def _pipeline_layout(self, made: Made) -> dict[str, Any]:
+        return {"bindGroupLayouts": [self.refer(one) for one in made.descriptor["bind_group_layouts"]]}
+
+    def _shader_module(self, made: Made) -> dict[str, Any]:
+        code = made.descriptor["code"].encode()
+        name = f"shaders/{hashlib.sha256(code).hexdigest()[:20]}.wgsl"
+        (self._folder / "shaders").mkdir(exist_ok=True)
+        (self._folder / name).write_bytes(code)
+        return {"file": name}
+
+    def _render_pipeline(self, made: Made) -> dict[str, Any]:
+        found = {key: value for key, value in made.descriptor.items() if value is not None}
+        for stage in ("vertex", "fragment"):
+            if stage in found:
+                found[stage] = {**found[stage], "module": self.refer(found[stage]["module"])}
+                found[stage] = {key: value for key, value in found[stage].items() if value != ""}
+        return dict(_camel({**found, "layout": self.refer(found["layout"])}))
+
+
+def _attached(one: RenderPass) -> list[Any]:
+    depth = one.attachments.get("depth_stencil_attachment")
+    return [a["view"] for a in one.attachments["color_attachments"]] + ([depth["view"]] if depth else [])
+
+
+def _camel(value: Any) -> Any:
+    """A descriptor of wgpu in the words of WebGPU: keys in camelCase, but for the constants of shaders."""
+    if isinstance(value, dict):
+        return {_word(key): one if key == "constants" else _camel(one) for key, one in value.items()}
+    return [_camel(one) for one in value] if isinstance(value, list | tuple) else value
+
+
+def _word(snake: str) -> str:
+    return re.sub("_([a-z0-9])", lambda match: match[1].upper(), snake)

@@ -1,0 +1,42 @@
+"""The page's modules in node, and a site of the box."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+import lambent
+from lambent.site import export
+
+PAGE = Path(export.__file__).parent / "page"
+
+
+@pytest.fixture
+def javascript(tmp_path):
+    """Runs JavaScript that ends with `say(VALUE)`, beside the page's modules; returns the value."""
+    if shutil.which("node") is None:
+        pytest.skip("there is no node to run the page's modules")
+    for file in PAGE.glob("*.js"):
+        shutil.copy(file, tmp_path)
+    (tmp_path / "package.json").write_text('{"type": "module"}')
+
+    def run(code: str, given: object = None):
+        (tmp_path / "given.json").write_text(json.dumps(given))
+        head = "import fs from 'node:fs'; const say = (one) => fs.writeFileSync('said.json', JSON.stringify(one));"
+        (tmp_path / "run.js").write_text(f"{head}\nconst given = JSON.parse(fs.readFileSync('given.json'));\n{code}")
+        done = subprocess.run(["node", "run.js"], capture_output=True, text=True, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        return json.loads((tmp_path / "said.json").read_text())
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def box_site(adapter, baked_box, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("site") / "box"
+    lambent.export(baked_box, folder)
+    return folder

@@ -1,0 +1,99 @@
+"""A store as a folder: complete, sound, small, and nothing else is overwritten."""
+
+from __future__ import annotations
+
+import gzip
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import lambent
+from lambent.core.errors import UserError
+from lambent.realtime.frame_state import FrameState
+from lambent.realtime.renderer import Renderer
+from lambent.site.chunks import Packing
+from lambent.store.store import Store
+
+
+def manifest_of(site: Path) -> dict:
+    return json.loads((site / "manifest.json").read_text())
+
+
+def unpacked(site: Path, piece: dict) -> bytes:
+    """As the page unpacks it, by cumulative sums."""
+    data = gzip.decompress((site / piece["file"]).read_bytes())
+    if "packing" not in piece:
+        return data
+    packing, at, parts = Packing(**piece["packing"]), 0, []
+    for count, back in packing.runs:
+        size = count * packing.word
+        planes = np.frombuffer(data[at : at + size], np.uint8).reshape(packing.word, packing.channels, -1)
+        words = np.ascontiguousarray(planes.transpose(1, 2, 0)).view(f"<u{packing.word}")[..., 0]
+        run = np.cumsum(words.T, axis=0, dtype=words.dtype).ravel()
+        for first in range(back, count, back) if back else ():
+            run[first : first + back] += run[first - back : first][: len(run[first : first + back])]
+        parts.append(run.tobytes())
+        at += size
+    return b"".join(parts)
+
+
+def test_every_file_is_there_and_holds_what_the_manifest_says(box_site):
+    manifest = manifest_of(box_site)
+    pieces = [one["data"] for kind in ("buffer", "texture") for one in manifest["tables"][kind] if "data" in one]
+    assert len(pieces) > 20
+    for piece in pieces:
+        data = unpacked(box_site, piece)
+        assert len(data) == piece["bytes"] and hashlib.sha256(data).hexdigest() == piece["sha256"]
+        assert (box_site / piece["file"]).stat().st_size == piece["packed"]
+    assert all((box_site / one["file"]).is_file() for one in manifest["tables"]["shader_module"])
+    assert all((box_site / name).is_file() for name in ("index.html", "main.js", "site.css", "poster.jpg"))
+    text = "".join(file.read_text("utf-8") for file in box_site.glob("*.*s*") if file.suffix in (".js", ".css"))
+    assert "http://" not in text and "https://" not in text, "no third party is asked"
+
+
+def test_the_frame_has_the_faces_out_of_view(baked_box, box_site):
+    manifest, record = manifest_of(box_site), Store.open(baked_box)
+    faces = sum(one.face_count for one in lambent.open(baked_box).arrays and _objects(record))
+    drawn = sum(c[1] for c in manifest["passes"][0]["commands"] if c[0] == "drawIndexed")
+    assert drawn == 3 * faces
+
+
+def _objects(store: Store):
+    from lambent.store.contract import scene_record
+
+    return scene_record(store).objects
+
+
+def test_a_frame_as_data_draws_what_the_renderer_draws(device, baked_box):
+    renderer = Renderer(device, Store.open(baked_box))
+    state = FrameState(renderer.scene.record.cameras[0], 64, 48)
+    from lambent.realtime.gpu.commands import Commands
+    from lambent.realtime.gpu.targets import pixels
+
+    image, commands = renderer.display_image(state), Commands()
+    target = renderer.target("display", state.size)
+    renderer.frame(state, commands, target.create_view(), whole=True)
+    encoder = device.create_command_encoder()
+    commands.encode(encoder)
+    device.queue.submit([encoder.finish()])
+    assert np.array_equal(pixels(device, target), image)
+
+
+def test_a_site_is_replaced_and_nothing_else(adapter, baked_box, box_site, tmp_path):
+    other = tmp_path / "letters"
+    other.mkdir()
+    (other / "to a friend.txt").write_text("dear")
+    for wrong, message in ((other, "holds other files than a site"), (other / "to a friend.txt", "is no folder")):
+        with pytest.raises(UserError, match=message):
+            lambent.export(baked_box, wrong)
+    site = tmp_path / "site"
+    lambent.export(baked_box, site)
+    (site / "data/old.gz").write_bytes(b"old")
+    made = lambent.export(baked_box, site)
+    files = {file.name for file in (site / "data").iterdir()}
+    assert "old.gz" not in files and len(files) == made["files"]
+    assert made["bytes"] == sum(file.stat().st_size for file in (site / "data").iterdir()) < 2e6
+    assert manifest_of(site) == manifest_of(box_site), "the same store makes the same site"
