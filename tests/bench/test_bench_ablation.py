@@ -6,9 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from lambent.baking.bake import bake
 from lambent.baking.light import sampling
-from lambent.baking.quality import quality_named
 from lambent.bench.measuring.switches import BAKE, SWITCHES, TRACE, Switch, is_frozen, switched
 from lambent.bench.pictures import ablation
 from lambent.core.errors import UserError
@@ -16,9 +14,8 @@ from lambent.realtime.gpu import cube_mips, shader_source
 from lambent.realtime.incident import planes
 from lambent.realtime.integrators.integrators import INTEGRATORS
 from lambent.realtime.light import probe_lamps, probe_light
-from lambent.scenes.loaders.load import load_scene
+from tests.bench.conftest import COARSE
 
-COARSE = quality_named("preview").changed("coarse", geometry={"texels": 64}, environment={"texels": 32})
 WHITE = Switch("colour.wgsl:srgb_encode", "    return vec3f(1.0);")
 UNREAD = Switch("lambent.realtime.overlays.outline.REACH_PX", 7)
 FROZEN = Switch("lambent.baking.surfaces.clusters.MIXED", 0.0)
@@ -73,22 +70,14 @@ def test_switches_are_of_what_there_is() -> None:
             pass
 
 
-@pytest.fixture(scope="module")
-def store(tmp_path_factory):
-    """The folder of a coarse box."""
-    folder = tmp_path_factory.mktemp("baked") / "box.store"
-    bake(load_scene("builtin:box"), folder, quality=COARSE)
-    return folder
-
-
 @pytest.mark.usefixtures("adapter")
-def test_rows_say_what_changes(store):
+def test_rows_say_what_changes(coarse_box):
     noisy = Switch("lambent.traced.picture.ENDED", 0, TRACE)
     darker = Switch("lambent.baking.light.sampling.closed", lambda *given: 0.5 * before(*given), BAKE)
     before = sampling.closed
     effort = replace(ablation.QUICK, width=64, height=48, truth_spp=16, quality=COARSE,
                      switches=(WHITE, UNREAD, FROZEN, noisy, darker))  # fmt: skip
-    report = ablation.run(effort, inputs=[store])
+    report = ablation.run(effort, inputs=[coarse_box])
     rows = {row["switch"]: row for row in report["rows"] if row["switch"] != ablation.AS_IS}
     assert [row["when"] for row in report["rows"] if row["switch"] == ablation.AS_IS] == ["draw", "trace", "bake"]
     as_is = report["rows"][0]

@@ -10,29 +10,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lambent.baking.bake import bake
-from lambent.baking.quality import quality_named
 from lambent.bench.measuring.reference import Reference
 from lambent.bench.pictures import accumulate, edits
-from lambent.scenes.loaders.load import load_scene
 from lambent.store.store import Store
 from lambent.traced.room import TracedRoom
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A coarse box with light groups."""
-    path = tmp_path_factory.mktemp("baked") / "box.store"
-    coarse = quality_named("preview").changed("coarse", geometry={"texels": 64}, environment={"texels": 32})
-    bake(load_scene("builtin:box"), path, quality=coarse, light_groups="scene")
-    return path
-
-
-def test_pictures_at_rest_come_below_path_tracing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pictures_at_rest_come_below_path_tracing(coarse_box: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ticks = itertools.count()  # a second for each step
     monkeypatch.setattr(accumulate, "time", SimpleNamespace(process_time=lambda: float(next(ticks))))
     effort = replace(accumulate.QUICK, width=96, height=64, truth_spp=512, seconds=(1.0, 14.0))
-    report = accumulate.run(effort, inputs=[folder])
+    report = accumulate.run(effort, inputs=[coarse_box])
     first, last = report["rows"]
     assert first["ended"] < 16 and first["gathered"] == 0 and last["ended"] == 16 and last["gathered"] > 16
     assert (first["seconds"], last["seconds"], last["denoising_s"]) == (3.0, 14.0, 1.0)
@@ -42,9 +30,9 @@ def test_pictures_at_rest_come_below_path_tracing(folder: Path, monkeypatch: pyt
     assert report["summary"]["box.store"] == {key: last[key] for key in ("flip", "bar", "flip_worst_tile")}
 
 
-def test_edits_of_all_kinds_show(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_edits_of_all_kinds_show(coarse_box: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     effort = replace(edits.QUICK, width=96, height=64, samples=32, truth_spp=256)
-    report = edits.run(effort, inputs=[folder])
+    report = edits.run(effort, inputs=[coarse_box])
     baked, *edited = report["rows"]
     assert baked["edit"] == "as baked" and baked["unedited_flip"] == pytest.approx(baked["flip"], rel=0.05)
     colour, look, lamp, curve = edited
@@ -59,7 +47,7 @@ def test_edits_of_all_kinds_show(folder: Path, monkeypatch: pytest.MonkeyPatch) 
         "set_materials",
         lambda room, *states: set_materials(room, *(states if room._light is None else ({}, {}))),
     )
-    stays = list(edits.rows_of(Store.open(folder), replace(effort, edits=1)))[1]
+    stays = list(edits.rows_of(Store.open(coarse_box), replace(effort, edits=1)))[1]
     assert stays["flip"] > colour["flip"] and stays["left_unedited"] > 0.05
 
 

@@ -7,32 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.baking.bake import bake
-from lambent.baking.quality import quality_named
 from lambent.bench.pictures import equal_time
 from lambent.bench.registry import run_bench
 from lambent.core.errors import UserError
 from lambent.core.pictures.images import write_image
 from lambent.render import Settings, images
-from lambent.scenes.loaders.load import load_scene
 from lambent.store.contract import scene_record
 from lambent.store.store import Store
 
 pytestmark = pytest.mark.usefixtures("adapter")
 
 
-@pytest.fixture(scope="module")
-def store(tmp_path_factory):
-    """The folder of a coarse box."""
-    folder = tmp_path_factory.mktemp("baked") / "box.store"
-    coarse = quality_named("preview").changed("coarse", geometry={"texels": 64}, environment={"texels": 32})
-    bake(load_scene("builtin:box"), folder, quality=coarse)
-    return folder
-
-
-def test_rows_name_the_rival_of_equal_time(store):
+def test_rows_name_the_rival_of_equal_time(coarse_box):
     effort = replace(equal_time.QUICK, width=96, height=64, truth_spp=32, runs=1, samples=(1, 64))
-    report = equal_time.run(effort, inputs=[store])
+    report = equal_time.run(effort, inputs=[coarse_box])
     frame, first, traced, one, many = report["rows"]
     assert [row["method"] for row in report["rows"]] == ["frame", "traced 1", "traced 64", "path 1 spp", "path 64 spp"]
     assert [row["equal"] for row in (one, many)].count(True) == 1
@@ -62,31 +50,31 @@ def test_times_of_equal_error_are_interpolated():
     assert equal == {"flip": 0.07, "traced": pytest.approx(2**0.5, abs=1e-3), "path": 8.0, "ratio": 0.177}
 
 
-def test_finished_references_are_the_truth_of_rows_of_their_size(store, tmp_path):
+def test_finished_references_are_the_truth_of_rows_of_their_size(coarse_box, tmp_path):
     effort = replace(equal_time.QUICK, width=96, height=64, runs=1, samples=(1,))
     files = []
-    camera = scene_record(Store.open(store)).cameras[0]
+    camera = scene_record(Store.open(coarse_box)).cameras[0]
     for seed in (1, 2):
-        traced = images(Store.open(store), Settings(80, 48, "path", samples=64, seed=seed))
+        traced = images(Store.open(coarse_box), Settings(80, 48, "path", samples=64, seed=seed))
         files.append(tmp_path / f"{seed}.exr")
         write_image(files[-1], traced.radiance(camera))
-    both = equal_time.run(effort, inputs=[store], reference=files)["rows"]
-    alone = equal_time.run(effort, inputs=[store], reference=files[:1])["rows"]
-    traced_here = equal_time.run(replace(effort, width=80, height=48, truth_spp=128), inputs=[store])["rows"]
+    both = equal_time.run(effort, inputs=[coarse_box], reference=files)["rows"]
+    alone = equal_time.run(effort, inputs=[coarse_box], reference=files[:1])["rows"]
+    traced_here = equal_time.run(replace(effort, width=80, height=48, truth_spp=128), inputs=[coarse_box])["rows"]
     assert both[0]["reference_flip"] > 0 and alone[0]["reference_flip"] is None
     assert both[0]["flip"] == pytest.approx(traced_here[0]["flip"], rel=0.15)
     assert both[0]["flip"] != alone[0]["flip"]
 
 
-def test_references_that_cannot_be_used_are_named(store, tmp_path):
+def test_references_that_cannot_be_used_are_named(coarse_box, tmp_path):
     for name, shape in (("small", (4, 6, 3)), ("large", (8, 6, 3)), ("shown", (4, 6, 3))):
         write_image(tmp_path / (name + (".png" if name == "shown" else ".exr")), np.ones(shape, np.float32))
     small, large, shown = (tmp_path / name for name in ("small.exr", "large.exr", "shown.png"))
     with pytest.raises(UserError, match=r"large.exr: references differ in size; found 6x8; expected 6x4"):
-        run_bench("equal-time", "quick", inputs=[store], reference=[small, large])
+        run_bench("equal-time", "quick", inputs=[coarse_box], reference=[small, large])
     with pytest.raises(UserError, match=r"shown.png: a reference must hold radiance; expected .exr or .hdr"):
-        run_bench("equal-time", "quick", inputs=[store], reference=[shown])
+        run_bench("equal-time", "quick", inputs=[coarse_box], reference=[shown])
     with pytest.raises(UserError, match=r"--reference: a reference belongs to one store; found 0 inputs"):
         run_bench("equal-time", "quick", reference=[small])
     with pytest.raises(UserError, match=r"--reference: this bench takes no reference; found flicker"):
-        run_bench("flicker", "quick", inputs=[store], reference=[small])
+        run_bench("flicker", "quick", inputs=[coarse_box], reference=[small])
