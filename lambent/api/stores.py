@@ -322,7 +322,10 @@ class Store:
 
         known("variant", variant, ("", *self.variants), field="variant")
         self._check(edits or {})
-        track, where = self._mix(light), None if camera is None else view_of(opened_with_views(self.arrays)[1], camera)
+        settings = self._settings(size, light, variant, exposure_ev=exposure_ev)
+        settings.check()
+        track = settings.light
+        where = None if camera is None else view_of(opened_with_views(self.arrays)[1], camera)
         with needing_extras():
             from lambent.viewer.canvas.cell import open_cell
 

@@ -139,6 +139,8 @@ def test_it_says_what_is_missing_in_a_line(adapter, baked_box):
         store.view()
     for wrong, message in (
         ({"camera": "back"}, "unknown camera.*back"),
+        ({"size": (0, 90)}, "size"),
+        ({"exposure_ev": float("nan")}, "exposure"),
         ({"variant": "night"}, "unknown variant.*night"),
         ({"light": {"lmap": 1.0}}, "unknown light group.*lmap"),
         ({"edits": {"rde": store.materials["red"]}}, "unknown material.*rde"),
