@@ -116,7 +116,7 @@ def bake_store(folder: Path) -> None:
 
 
 def _materials(folder: Path) -> None:
-    table = synthesise(BRUSHED, Setup((0.0, 30.0, 60.0), step_deg=15, fine_deg=5, noise=0, floor=0))
+    table = synthesise(BRUSHED, Setup((0.0, 30.0, 60.0), step_deg=30, fine_deg=10, noise=0, floor=0))
     for name in (*(f"out/demo/measured/{name}.txt" for name in SPECIMEN_OF), "brushed.bsdf", "oak.bsdf", "satin.bsdf"):
         write_gonio(folder / name, table)
     for name in ("brushed", "copper", "slate", "satin"):

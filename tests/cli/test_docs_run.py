@@ -1,8 +1,8 @@
 """Every command and every piece of Python in README and docs is run, page by page, or says why it is not.
 
 Lines run as they are written, in a folder of small files under the names that the pages use. What "preview" and
-"normal" mean is coarse here, and pictures in reports are small. Windows, which wait for a person, are not opened: their
-own tests do that.
+"normal" mean is coarse here, illuminances take few samples, and pictures in reports are small. Windows, which wait for
+a person, are not opened: their own tests do that.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ def reader(tmp_path_factory: pytest.TempPathFactory, mi: None, adapter: None) ->
 
 @pytest.fixture
 def coarse(monkeypatch: pytest.MonkeyPatch) -> list[object]:
-    """Bakes and the previews of reports are coarse, and windows are listed instead of opened."""
+    """Bakes, illuminances and the previews of reports are coarse, and windows are listed instead of opened."""
+    from lambent.baking.pictures import irradiance
     from lambent.baking.reference import material_preview
     from lambent.viewer import app, edit
 
@@ -53,6 +54,7 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> list[object]:
     )
     small = partial(material_preview.preview, size_px=32, spp=8)
     monkeypatch.setattr(material_preview, "preview", small)
+    monkeypatch.setattr(irradiance, "MOST", 64)
     return opened
 
 
