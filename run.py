@@ -26,8 +26,9 @@ STAMP = VENV / "lambent-ready.json"
 PYTHONS = ((3, 11), (3, 12), (3, 13))  # those that every dependency has ready-made packages for
 BLENDER = "bpy==5.0.1"  # Blender as a package, for Python 3.11; tests that need it skip where it is not
 BLENDER_PACKAGES = ["libsm6", "libgl1", "libxfixes3", "libxi6", "libxkbcommon0", "libxrender1"]  # that it loads
-VALIDATOR = "gltf-validator@2.0.0-dev.3.10"  # of npm, without dependencies; tests that need it skip where it is not
-WINDOW_TEST_PACKAGES = {"Xvfb": "xvfb", "xdotool": "xdotool"}
+# Of npm: the glTF validator, and what checks the JavaScript of sites; tests that need one skip where it is not.
+NODE_PACKAGES = ("gltf-validator@2.0.0-dev.3.10", "typescript@5.9.3", "@webgpu/types@0.1.74", "prettier@3.6.2")
+WINDOW_TEST_PACKAGES = {"Xvfb": "xvfb", "xdotool": "xdotool", "chromium": "chromium"}
 
 
 class Stop(Exception):
@@ -93,7 +94,7 @@ def set_up(for_tests):
     make_venv()
     install_package(for_tests)
     if for_tests:
-        install_validator()
+        install_node_packages()
         install_blender()
     install_system_parts(for_tests)
     STAMP.write_text(json.dumps({"wanted": wanted, "tests": for_tests}), encoding="utf-8")
@@ -102,7 +103,7 @@ def set_up(for_tests):
 def fingerprint():
     """Changes whenever the installation has to be done again: requirements, Python, or the place of this folder."""
     parts = [(HOME / name).read_bytes() for name in ("pyproject.toml", "constraints.txt")]
-    parts += [sys.version.encode(), str(HOME).encode(), VALIDATOR.encode(), BLENDER.encode()]
+    parts += [sys.version.encode(), str(HOME).encode(), *(name.encode() for name in NODE_PACKAGES), BLENDER.encode()]
     return hashlib.sha256(b"\0".join(parts)).hexdigest()
 
 
@@ -140,14 +141,14 @@ def install_package(for_tests):
     call([*pip, "-c", HOME / "constraints.txt", "-e", what], "installation failed; is there a network connection?")
 
 
-def install_validator():
-    """Khronos's glTF validator into .venv/node, where there is npm; without it the tests say what they skip."""
+def install_node_packages():
+    """NODE_PACKAGES into .venv/node, where there is npm; without them the tests say what they skip."""
     npm = shutil.which("npm")
     if npm is None:
         return
     options = ["--prefix", VENV / "node", "--no-save", "--no-package-lock", "--no-audit", "--no-fund", "--silent"]
-    if subprocess.call([npm, "install", *options, VALIDATOR], stdout=subprocess.DEVNULL) != 0:
-        say(f"npm could not install {VALIDATOR}; the tests that need it will skip")
+    if subprocess.call([npm, "install", *options, *NODE_PACKAGES], stdout=subprocess.DEVNULL) != 0:
+        say(f"npm could not install {', '.join(NODE_PACKAGES)}; the tests that need them will skip")
 
 
 def install_blender():

@@ -13,6 +13,7 @@ import numpy as np
 
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
+from lambent.core.inputs import read_head
 from lambent.core.light.exposure import metered
 from lambent.core.progress import Progress, silent
 from lambent.core.views.camera import Camera
@@ -29,6 +30,7 @@ from lambent.store.kept.views import read_views
 from lambent.store.store import Store
 
 FORMAT, VERSION = "lambent-site", 1
+HEAD = b'{"format":"lambent-site"'  # of a manifest
 SIZE = 640, 360  # of the frame that is described; the page's follows its canvas
 POSTER = 1280, 720  # a picture for browsers without WebGPU, and while the room loads
 DISPLAY = "site"
@@ -87,11 +89,8 @@ def _check(folder: Path) -> None:
     if not folder.is_dir():
         raise UserError("is no folder", file=folder, expected="a folder for the site")
     if any(folder.iterdir()):
-        try:
-            ours = json.loads((folder / "manifest.json").read_text("utf-8")).get("format") == FORMAT
-        except (OSError, ValueError, AttributeError):
-            ours = False
-        if not ours:
+        manifest = folder / "manifest.json"
+        if not manifest.is_file() or not read_head(manifest, len(HEAD)).startswith(HEAD):
             raise UserError("holds other files than a site", file=folder, hint="choose a new folder")
         for part in ("data", "shaders"):
             shutil.rmtree(folder / part, ignore_errors=True)

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import base64
+import json
+import shutil
+import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +15,9 @@ from lambent.core.views.camera import Camera
 from lambent.realtime.frame_state import FrameState, frame_data
 from lambent.site.chunks import Packing
 from lambent.viewer.cameras import cameras
+from tests.site.conftest import PAGE
+
+ROOT = Path(__file__).parents[2]
 
 BOUNDS = ((-3.0, 0.0, -4.0), (5.0, 2.7, 6.0))
 CAMERAS = [
@@ -88,3 +95,37 @@ def test_data_of_another_length_are_refused(javascript):
     try { unpack(new Uint8Array(12), given); } catch (error) { fault = error instanceof SiteError && error.message; }
     say(fault);"""
     assert "not as long" in javascript(code, {"word": 2, "channels": 1, "runs": [[4, 0]]})
+
+
+@pytest.fixture
+def node_packages():
+    """The folder of what npm installed for the tests."""
+    folder = ROOT / ".venv/node/node_modules"
+    if not (folder / "typescript").is_dir() or not (folder / "prettier").is_dir() or shutil.which("node") is None:
+        pytest.skip("typescript and prettier are not installed: `python3 run.py test` does it where there is npm")
+    return folder
+
+
+@pytest.mark.slow
+def test_types_fit(node_packages, tmp_path):
+    options = {
+        "allowJs": True, "checkJs": True, "noEmit": True, "strict": True, "target": "ES2022", "module": "ES2022",
+        "moduleResolution": "bundler", "lib": ["ES2023", "DOM", "DOM.Iterable"], "types": ["@webgpu/types"],
+        "typeRoots": [str(node_packages)],
+    }  # fmt: skip
+    (tmp_path / "tsconfig.json").write_text(json.dumps({"compilerOptions": options, "include": [f"{PAGE}/*.js"]}))
+    command = ["node", node_packages / "typescript/bin/tsc", "-p", tmp_path]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.slow
+def test_the_page_is_formatted(node_packages):
+    files = sorted(PAGE.glob("*.*"))
+    command = ["node", node_packages / "prettier/bin/prettier.cjs", "--print-width", "120", "--check", *files]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_page_stays_small():
+    assert sum(len(file.read_text("utf-8").splitlines()) for file in PAGE.glob("*.js")) <= 2500
