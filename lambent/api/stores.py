@@ -337,10 +337,7 @@ class Store:
     def light_map(self, file: str | Path) -> None:
         """Write the light map as an image (.exr, W/m^2) and, beside it, its meshes (.glb), uv2 as second coordinates.
 
-        Raises
-        ------
-        UserError
-            If the store has no complete light map, or a file cannot be written.
+        Raises `UserError` if the store has no complete light map, or a file cannot be written.
         """
         from lambent.store.light_map_file import write_light_map
 
