@@ -1,4 +1,4 @@
-"""Pages of the site from the notebooks, which have no outputs: text, code, and small pictures of what they show.
+"""Pages of the site from the notebooks, which have no outputs: text, code, and what they show, kept in `shown/`.
 
 .venv/bin/python docs/notebook_pages.py     # executes the notebooks and makes the pictures anew
 """
@@ -30,25 +30,29 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def page_of(file: Path) -> Iterator[str]:
-    """The cells as Markdown, a picture below each that has one, and the way to the file below the title."""
+    """The cells as Markdown, what each shows below it, and the way to the file below the title."""
     for number, cell in enumerate(json.loads(file.read_text("utf-8"))["cells"]):
-        text = "".join(cell["source"])
-        if cell["cell_type"] == "code":
-            yield f"```python\n{text}\n```"
-            if picture_of(file, number).exists():
-                yield f"![Output](pictures/{picture_of(file, number).name})"
+        source = "".join(cell["source"])
+        if cell["cell_type"] != "code":
+            yield source
         else:
-            yield text
+            yield f"```python\n{source}\n```"
+            text, picture = (shown_of(file, number, ending) for ending in ("txt", "jpg"))
+            if text.exists():
+                yield f"```text\n{text.read_text('utf-8')}```"
+            if picture.exists():
+                yield f"![Output](shown/{picture.name})"
         if number == 0:
             yield NOTE.format(name=file.stem)
 
 
-def picture_of(file: Path, number: int) -> Path:
-    return NOTEBOOKS / "pictures" / f"{file.stem}-{number}.jpg"
+def shown_of(file: Path, number: int, ending: str) -> Path:
+    """What the cell of this number shows: text (txt) or a picture (jpg)."""
+    return NOTEBOOKS / "shown" / f"{file.stem}-{number}.{ending}"
 
 
 def main(names: list[str]) -> None:
-    """Execute the notebooks of these names, by default all, and keep the last picture of each cell."""
+    """Execute the notebooks of these names, by default all, and keep text and the last picture of each cell."""
     import nbformat
     from nbclient import NotebookClient
 
@@ -57,10 +61,23 @@ def main(names: list[str]) -> None:
         with tempfile.TemporaryDirectory() as folder:
             NotebookClient(notebook, timeout=None, resources={"metadata": {"path": folder}}).execute()
         for number, cell in enumerate(notebook.cells):
-            shown = [o.data for o in cell.get("outputs", []) if "data" in o]
-            pictures = [data[kind] for data in shown for kind in ("image/png", "image/jpeg") if kind in data]
+            outputs = cell.get("outputs", [])
+            pictures = [
+                o.data[kind] for o in outputs for kind in ("image/png", "image/jpeg") if kind in o.get("data", {})
+            ]
             if pictures:
-                keep(base64.b64decode(pictures[-1]), picture_of(file, number))
+                keep(base64.b64decode(pictures[-1]), shown_of(file, number, "jpg"))
+            if text := "".join(said_by(outputs)):
+                shown_of(file, number, "txt").write_text(text, "utf-8")
+
+
+def said_by(outputs: list[Any]) -> Iterator[str]:
+    """What is printed, and results without a picture."""
+    for output in outputs:
+        if output.output_type == "stream" and output.name == "stdout":
+            yield output.text
+        elif output.output_type == "execute_result" and not {"image/png", "image/jpeg"} & output.data.keys():
+            yield output.data["text/plain"] + "\n"
 
 
 def keep(picture: bytes, file: Path) -> None:
