@@ -15,7 +15,7 @@ from typing import Any
 from lambent.realtime.gpu.commands import Commands, RenderPass
 from lambent.realtime.gpu.described import DescribedDevice, Made
 from lambent.realtime.gpu.pipelines import VERTEX_FLOATS
-from lambent.realtime.gpu.read_back import TEXELS, buffer_bytes, texture_levels
+from lambent.realtime.gpu.read_back import BLOCKS, buffer_bytes, texel, texture_levels
 from lambent.site.chunks import Chunks, Packing
 
 VERTEX, INDEX = 0x20, 0x10  # usages of buffers
@@ -82,9 +82,9 @@ class Manifest:
 
     def _texels(self, texture: Any) -> dict[str, Any]:
         levels = texture_levels(self._device, texture)
-        if texture.format not in TEXELS:
+        if texture.format in BLOCKS:
             return self.chunks.add(b"".join(levels))
-        word, channels = TEXELS[texture.format]
+        word, channels = texel(texture.format)
         layers = texture.size[2]
         runs = [(len(level) // word, len(level) // word // layers * FACES if layers > FACES else 0) for level in levels]
         return self.chunks.add(b"".join(levels), Packing(word, channels, runs))

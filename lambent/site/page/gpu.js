@@ -4,26 +4,15 @@ import { readText, SiteError } from "./loading.js";
 import { frameOf } from "./camera.js";
 
 const CANVAS = "canvas";
-/** @type {Record<string, [number, number]>} bytes of a block, texels a side */
-const BLOCKS = {
-  "bc6h-rgb-ufloat": [16, 4],
-  r8unorm: [1, 1],
-  rg8unorm: [2, 1],
-  rgba8unorm: [4, 1],
-  "rgba8unorm-srgb": [4, 1],
-  r16float: [2, 1],
-  rg16float: [4, 1],
-  rgba16float: [8, 1],
-  r32float: [4, 1],
-  rg32float: [8, 1],
-  rgba32float: [16, 1],
-  r32uint: [4, 1],
-  rgba16uint: [8, 1],
-  rgba32uint: [16, 1],
-  rgb10a2unorm: [4, 1],
-  depth32float: [4, 1],
-  rgb9e5ufloat: [4, 1],
-};
+const WORDS = ["rgb10a2unorm", "rgb9e5ufloat", "depth32float"]; // of 4 bytes a texel
+
+/** Bytes of a block, and its texels a side. @param {string} format @returns {[number, number]} */
+function blockOf(format) {
+  if (format === "bc6h-rgb-ufloat") return [16, 4];
+  const parts = WORDS.includes(format) ? null : /^([rgba]+)(8|16|32)/.exec(format);
+  return [parts ? (parts[1].length * Number(parts[2])) / 8 : 4, 1];
+}
+
 const FILL_DEPTH = `
 @group(0) @binding(0) var depths: texture_2d_array<f32>;
 override LAYER: i32;
@@ -137,7 +126,7 @@ export class Frame {
           usage: GPUTextureUsage.COPY_DST | GPUTextureUsage.TEXTURE_BINDING,
         })
       : made;
-    const [bytes, side] = BLOCKS[one.format];
+    const [bytes, side] = blockOf(one.format);
     const [width, height, layers = 1] = one.size;
     for (let level = 0, offset = 0; level < (one.mipLevelCount ?? 1); level++) {
       const columns = Math.ceil(Math.max(1, width >> level) / side),
