@@ -6,11 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from lambent.api.progress import Wanted, progress_of
-from lambent.api.stores import Store
+from lambent.api.stores import Note, Store
 from lambent.core.extras import needing_extras
 
 
-def export(store: Store | str | Path, folder: str | Path, *, progress: Wanted = None) -> dict[str, Any]:
+def export(
+    store: Store | str | Path, folder: str | Path, *, note: Note | None = None, progress: Wanted = None
+) -> dict[str, Any]:
     """Write a store as a static web site, in which a browser with WebGPU walks: any host can serve the folder.
 
     Parameters
@@ -19,8 +21,8 @@ def export(store: Store | str | Path, folder: str | Path, *, progress: Wanted = 
         A baked scene, or its folder.
     folder : str or Path
         New, empty, or a site, which is replaced.
-    progress : bool or callable, optional
-        As of `Table.fit`.
+    note, progress
+        As of `Store.render`.
 
     Returns
     -------
@@ -36,4 +38,4 @@ def export(store: Store | str | Path, folder: str | Path, *, progress: Wanted = 
     with needing_extras(), progress_of(progress) as bar:
         from lambent.site.export import export as exported
 
-        return exported(opened.arrays, Path(folder), bar)
+        return exported(opened.arrays, Path(folder), bar, note or (lambda text: None))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from lambent.cli.console import Json, show, table
+from lambent.cli.console import Json, note, show, table
 from lambent.cli.walk import Store
 
 
@@ -22,6 +22,6 @@ def command(
     """
     from lambent.api.sites import export
 
-    made = export(store, output, progress=True)
+    made = export(store, output, note=note, progress=True)
     rows = [("site", str(output)), ("to transfer", f"{made['bytes'] / 1e6:.1f} MB in {made['files']} files")]
     show(made, f"{table(rows)}\n\nto look at it: lambent serve {output}", json)

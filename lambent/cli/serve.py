@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from lambent.cli.console import say
+from lambent.cli.console import note, say
 
 
 def command(
@@ -30,7 +30,7 @@ def command(
             from lambent.api.sites import export
 
             store, site = site, Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="lambent-site-")))
-            export(store, site, progress=True)
+            export(store, site, note=note, progress=True)
         server = stack.enter_context(SiteServer(site, host, port))
         say(f"{server.address} (Ctrl-C ends it)")
         server.serve_forever()

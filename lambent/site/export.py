@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any
@@ -15,7 +17,8 @@ from lambent.core.errors import UserError
 from lambent.core.files import write_text
 from lambent.core.inputs import read_head
 from lambent.core.light.exposure import metered
-from lambent.core.progress import Progress, silent
+from lambent.core.light.light_mix import MixTrack
+from lambent.core.progress import Progress, silent, tracked
 from lambent.core.views.camera import Camera
 from lambent.realtime.frame_state import FrameState, frame_data
 from lambent.realtime.gpu.commands import Commands
@@ -25,18 +28,24 @@ from lambent.realtime.gpu.structs import FRAME_DTYPE
 from lambent.realtime.light.baked import read_baked
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.resources import device_needs
+from lambent.render.applied_materials import AppliedMaterials
+from lambent.render.output import ignore
+from lambent.scenes.scene import Variant
 from lambent.site.manifest import Manifest
+from lambent.store.kept.states import lamps_of, variants_of
 from lambent.store.kept.views import read_views
+from lambent.store.light_groups import light_groups
 from lambent.store.store import Store
 
+Note = Callable[[str], None]
 FORMAT, VERSION = "lambent-site", 1
 HEAD = b'{"format":"lambent-site"'  # of a manifest
 SIZE = 640, 360  # of the frame that is described; the page's follows its canvas
 POSTER = 1280, 720  # a picture for browsers without WebGPU, and while the room loads
-DISPLAY = "site"
+DISPLAY, BAKED = "site", "as baked"
 
 
-def export(store: Store, folder: Path, progress: Progress = silent) -> dict[str, Any]:
+def export(store: Store, folder: Path, progress: Progress = silent, note: Note = ignore) -> dict[str, Any]:
     """Write a site of a baked scene; returns its figures: bytes, files, pipelines.
 
     Parameters
@@ -60,11 +69,12 @@ def export(store: Store, folder: Path, progress: Progress = silent) -> dict[str,
     saved = read_views(store.folder).cameras
     cameras = [*baked.record.cameras, *(one for one in saved if one.name not in {c.name for c in baked.record.cameras})]
     state = FrameState(cameras[0], *SIZE, planar="off")
-    shown, commands = renderer.target(DISPLAY, SIZE).create_view(), Commands()
-    renderer.frame(state, commands, shown, whole=True)
-    renderer.draw(state, shown)  # what uploads lazily is on the GPU now
-    manifest = Manifest(device, folder, SIZE, shown)
-    passes = manifest.passes(commands)
+    shown = renderer.target(DISPLAY, SIZE).create_view()
+    manifest, states = Manifest(device, folder, SIZE, shown), []
+    for name, now in tracked(list(_states(store, renderer, state, note)), progress, "states"):
+        commands = Commands()
+        renderer.frame(now(), commands, shown, whole=True)
+        states.append(manifest.state(name, commands))
     exposure_ev = baked.record.exposure_ev
     if exposure_ev is None:
         exposure_ev = metered(renderer.image(state)) or 0.0
@@ -72,7 +82,7 @@ def export(store: Store, folder: Path, progress: Progress = silent) -> dict[str,
         "format": FORMAT, "version": VERSION, "name": baked.record.name, "cameras": [_camera(one) for one in cameras],
         "bounds": np.asarray(baked.record.bounds).tolist(), "exposureEv": exposure_ev, "unit": baked.unit,
         "frame": _frame(manifest.refer(renderer.frame_buffer), state, baked.record.bounds),
-        "tables": manifest.tables, "passes": passes,
+        "tables": manifest.tables, "states": states,
     }  # fmt: skip
     _write_poster(renderer, replace(state, exposure_ev=exposure_ev, planar="auto"), folder / "poster.jpg")
     write_text(folder / "manifest.json", json.dumps(document, separators=(",", ":"), allow_nan=False))
@@ -94,6 +104,26 @@ def _check(folder: Path) -> None:
             raise UserError("holds other files than a site", file=folder, hint="choose a new folder")
         for part in ("data", "shaders"):
             shutil.rmtree(folder / part, ignore_errors=True)
+
+
+def _states(
+    store: Store, renderer: Renderer, state: FrameState, note: Note
+) -> Iterator[tuple[str, Callable[[], FrameState]]]:
+    """Names of the room's states, and what shows each and returns the state of its frame."""
+    applied = AppliedMaterials(store, renderer, note)
+
+    def shown(variant: Variant) -> FrameState:
+        applied.apply(variant.looks, {}, {}, lamps_of(store, variant.name) if variant.name else {})
+        light = MixTrack.of(variant.light).factors_at(0.0)
+        return replace(state, light=light, materials=applied.materials, maps=renderer.light_version)
+
+    yield BAKED, lambda: shown(Variant(""))
+    groups = {group.name for group in light_groups(store)}
+    for variant in variants_of(store):
+        if missing := sorted(set(variant.light.groups) - groups):
+            note(f"{variant.name} is left out: the store has no light group {', '.join(missing)}")
+        else:
+            yield variant.name, partial(shown, variant)
 
 
 def _write_poster(renderer: Renderer, state: FrameState, file: Path) -> None:

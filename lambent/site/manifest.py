@@ -32,12 +32,26 @@ class Manifest:
         self.chunks = Chunks(folder)
         self.tables: dict[str, list[Any]] = defaultdict(list)
         self._places: dict[int, int] = {}
-        self._drawn: set[int] = set()  # textures that the frame draws into
+        self._drawn: set[int] = set()  # textures that frames draw into
+        self._data: dict[tuple[str, int], Any] = {}  # objects with content, by kind and place
 
-    def passes(self, commands: Commands) -> list[dict[str, Any]]:
-        """The passes of a frame."""
+    def state(self, name: str, commands: Commands) -> dict[str, Any]:
+        """A state of the room: its passes, how many objects of each kind exist then, and contents other than at first.
+
+        The contents of the first state are those of the tables.
+        """
+        known = {place: dict(self.tables[place[0]][place[1]].get("data", {})) for place in self._data}
+        passes, changes = self._passes(commands), defaultdict[str, dict[int, Any]](dict)
+        for (kind, at), before in known.items():
+            now = self._content(self._data[kind, at])
+            if now["sha256"] != before["sha256"]:
+                changes[kind][at] = now
+        counts = {kind: len(table) for kind, table in self.tables.items()}
+        return {"name": name, "counts": counts, "changes": changes, "passes": passes}
+
+    def _passes(self, commands: Commands) -> list[dict[str, Any]]:
         views = [view for one in commands.passes for view in _attached(one)]
-        self._drawn = {id(self._device.made[id(view)].descriptor["texture"]) for view in views}
+        self._drawn |= {id(self._device.made[id(view)].descriptor["texture"]) for view in views}
         return [self._pass(one) for one in commands.passes]
 
     def refer(self, one: Any) -> int:
@@ -47,6 +61,8 @@ class Manifest:
             described = getattr(self, f"_{made.kind}")(made)
             table = self.tables[made.kind]
             self._places[id(one)] = len(table)
+            if "data" in described:
+                self._data[made.kind, len(table)] = one
             table.append(described)
         return self._places[id(one)]
 
@@ -66,10 +82,7 @@ class Manifest:
         return self.refer(one) if id(one) in self._device.made else one
 
     def _buffer(self, made: Made) -> dict[str, Any]:
-        data, usage = buffer_bytes(self._device, made.one), made.descriptor["usage"]
-        channels = VERTEX_FLOATS if usage & VERTEX else 3 if usage & INDEX else 1
-        packing = Packing(4, channels, [(len(data) // 4, 0)]) if len(data) % (4 * channels) == 0 else None
-        return {"usage": usage, "size": len(data), "data": self.chunks.add(data, packing)}
+        return {"usage": made.descriptor["usage"], "size": made.one.size, "data": self._content(made.one)}
 
     def _texture(self, made: Made) -> dict[str, Any]:
         size, drawn = tuple(made.one.size), id(made.one) in self._drawn
@@ -78,7 +91,17 @@ class Manifest:
             **_camel(made.descriptor), "size": [CANVAS, CANVAS, *size[2:]] if follows else list(size),
             "format": made.one.format,
         }  # fmt: skip
-        return found if drawn else {**found, "data": self._texels(made.one)}
+        return found if drawn else {**found, "data": self._content(made.one)}
+
+    def _content(self, one: Any) -> dict[str, Any]:
+        """Where the present content of a buffer or texture is."""
+        made = self._device.made[id(one)]
+        if made.kind == "texture":
+            return self._texels(one)
+        data, usage = buffer_bytes(self._device, one), made.descriptor["usage"]
+        channels = VERTEX_FLOATS if usage & VERTEX else 3 if usage & INDEX else 1
+        packing = Packing(4, channels, [(len(data) // 4, 0)]) if len(data) % (4 * channels) == 0 else None
+        return self.chunks.add(data, packing)
 
     def _texels(self, texture: Any) -> dict[str, Any]:
         levels = texture_levels(self._device, texture)

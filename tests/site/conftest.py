@@ -10,7 +10,9 @@ from pathlib import Path
 import pytest
 
 import lambent
+from lambent.materials.document import Lobe, Material
 from lambent.site import export
+from lambent.store.kept.session import FILE, RoomState, WalkSession, write_session
 
 PAGE = Path(export.__file__).parent / "page"
 
@@ -36,7 +38,16 @@ def javascript(tmp_path):
 
 
 @pytest.fixture(scope="session")
-def box_site(adapter, baked_box, tmp_path_factory):
+def blue_box(baked_box, tmp_path_factory):
+    """A store of the box with a state in which its red wall is blue and light follows."""
+    folder = shutil.copytree(baked_box, tmp_path_factory.mktemp("states") / "box.store")
+    blue = Material(name="red", kd=(0.05, 0.1, 0.7), lobes=(Lobe(mx=0.1, my=0.1),))
+    write_session(folder / FILE, WalkSession(states={"blue": RoomState(materials={"red": blue})}))
+    return folder
+
+
+@pytest.fixture(scope="session")
+def box_site(adapter, blue_box, tmp_path_factory):
     folder = tmp_path_factory.mktemp("site") / "box"
-    lambent.export(baked_box, folder)
+    lambent.export(blue_box, folder)
     return folder

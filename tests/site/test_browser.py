@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 import shutil
 import threading
 from contextlib import contextmanager
@@ -14,7 +15,9 @@ from lambent.core.pictures.metrics import flip
 from lambent.core.views.camera import Camera
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
+from lambent.render.applied_materials import AppliedMaterials
 from lambent.site.serving import SiteServer
+from lambent.store.kept.states import variants_of
 from lambent.store.store import Store
 from tests.site.test_page_modules import said
 
@@ -32,12 +35,16 @@ PIXELS = """async ([cameras, width, height]) => {
   const { readManifest, Data } = await import("/loading.js"), { Frame, openDevice } = await import("/gpu.js");
   const manifest = await readManifest(), device = await openDevice(manifest), faults = [];
   device.addEventListener("uncapturederror", (event) => faults.push(event.error.message));
-  const frame = await Frame.open(manifest, device, document.createElement("canvas"), new Data(() => {}));
+  const data = new Data(() => {});
+  const frame = await Frame.open(manifest, device, document.createElement("canvas"), data);
   frame.resize(width, height);
   const found = [];
-  for (const camera of cameras) {
-    const bytes = await frame.pixels(camera, manifest.exposureEv);
-    found.push(btoa(String.fromCharCode(...bytes)));
+  for (const state of [0, 1, 0]) {
+    await frame.show(state, data);
+    for (const camera of cameras) {
+      const bytes = await frame.pixels(camera, manifest.exposureEv);
+      found.push(btoa(String.fromCharCode(...bytes)));
+    }
   }
   return { faults, found, exposureEv: manifest.exposureEv };
 }"""
@@ -78,8 +85,11 @@ def served(folder):
 
 
 @pytest.mark.slow
-def test_pictures_are_those_of_the_native_renderer(chromium, device, baked_box, box_site):
-    low, high = np.array(Store.open(baked_box) and Renderer(device, Store.open(baked_box)).scene.record.bounds)
+def test_pictures_are_those_of_the_native_renderer(chromium, device, blue_box, box_site):
+    """Six cameras, in both states, and back in the first."""
+    store = Store.open(blue_box)
+    renderer = Renderer(device, store)
+    low, high = np.array(renderer.scene.record.bounds)
     middle, half = (low + high) / 2, (high - low) / 2
     cameras = [
         Camera(f"view {k}", tuple((middle + half * (np.array(eye) - [0, 1, 0])).tolist()), tuple(middle.tolist()))
@@ -89,14 +99,20 @@ def test_pictures_are_those_of_the_native_renderer(chromium, device, baked_box, 
         page.goto(f"{address}site.css")
         answer = page.evaluate(PIXELS, [[said(camera) for camera in cameras], *SIZE])
     assert answer["faults"] == []
-    renderer = Renderer(device, Store.open(baked_box))
-    for camera, text in zip(cameras, answer["found"], strict=True):
-        shown = np.frombuffer(base64.b64decode(text), np.uint8).reshape(SIZE[1], SIZE[0], 4)[..., :3]
-        state = FrameState(camera, *SIZE, planar="off", exposure_ev=answer["exposureEv"])
-        native = renderer.display_image(state)
-        assert native.std() > 10, f"{camera.name} shows something"
-        assert np.abs(shown.astype(float) - native).mean() < 0.5, camera.name
-        assert flip(native / 255, shown / 255).mean < 0.02, camera.name
+    found = iter(answer["found"])
+    applied, (blue,) = AppliedMaterials(store, renderer, lambda text: None), variants_of(store)
+    for looks in ({}, blue.looks, {}):
+        applied.apply(looks, {}, {})
+        for camera in cameras:
+            shown = np.frombuffer(base64.b64decode(next(found)), np.uint8).reshape(SIZE[1], SIZE[0], 4)[..., :3]
+            state = FrameState(
+                camera, *SIZE, planar="off", exposure_ev=answer["exposureEv"], materials=applied.materials,
+                maps=renderer.light_version,
+            )  # fmt: skip
+            native = renderer.display_image(state)
+            assert native.std() > 10, f"{camera.name} shows something"
+            assert np.abs(shown.astype(float) - native).mean() < 0.5, camera.name
+            assert flip(native / 255, shown / 255).mean < 0.02, camera.name
 
 
 @pytest.mark.slow
@@ -121,6 +137,9 @@ def test_a_visit(chromium, box_site):
         page.keyboard.up("w")
         page.click("#views button >> text=front")
         page.wait_for_selector(f"body[data-camera='{first}']", state="attached")
+        page.click("#states button >> text=blue")
+        page.wait_for_selector("body[data-state='blue']", state="attached")
+        assert page.get_attribute("#states button >> text=blue", "aria-pressed") == "true"
         page.click("#share")
         assert page.url == f"{address}#{first}"
         frames = int(page.get_attribute("body", "data-frames"))
@@ -147,12 +166,15 @@ def test_a_lost_device_comes_back(chromium, box_site):
 @pytest.mark.slow
 def test_a_damaged_or_missing_file_is_said(chromium, box_site, tmp_path):
     damaged = shutil.copytree(box_site, tmp_path / "damaged")
-    largest = max((damaged / "data").iterdir(), key=lambda file: file.stat().st_size)
+    manifest = json.loads((box_site / "manifest.json").read_text())
+    first = manifest["tables"]["texture"][: manifest["states"][0]["counts"]["texture"]]
+    name = max((one["data"] for one in first if "data" in one), key=lambda piece: piece["packed"])["file"]
+    largest = damaged / name
     content = bytearray(largest.read_bytes())
     content[len(content) // 2] ^= 255
     largest.write_bytes(content)
     missing = shutil.copytree(box_site, tmp_path / "missing")
-    max((missing / "data").iterdir(), key=lambda file: file.stat().st_size).unlink()
+    (missing / name).unlink()
     for folder, words in ((damaged, "is damaged; export the site again"), (missing, "cannot be fetched (404")):
         with chromium() as page, served(folder) as address:
             page.goto(address)

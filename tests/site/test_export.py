@@ -13,8 +13,11 @@ import pytest
 import lambent
 from lambent.core.errors import UserError
 from lambent.realtime.frame_state import FrameState
+from lambent.realtime.gpu.commands import Commands
+from lambent.realtime.gpu.targets import pixels
 from lambent.realtime.renderer import Renderer
 from lambent.site.chunks import Packing
+from lambent.store.contract import scene_record
 from lambent.store.store import Store
 
 
@@ -55,24 +58,26 @@ def test_every_file_is_there_and_holds_what_the_manifest_says(box_site):
 
 
 def test_the_frame_has_the_faces_out_of_view(baked_box, box_site):
-    manifest, record = manifest_of(box_site), Store.open(baked_box)
-    faces = sum(one.face_count for one in lambent.open(baked_box).arrays and _objects(record))
-    drawn = sum(c[1] for c in manifest["passes"][0]["commands"] if c[0] == "drawIndexed")
+    faces = sum(one.face_count for one in scene_record(Store.open(baked_box)).objects)
+    depth = manifest_of(box_site)["states"][0]["passes"][0]
+    drawn = sum(command[1] for command in depth["commands"] if command[0] == "drawIndexed")
     assert drawn == 3 * faces
 
 
-def _objects(store: Store):
-    from lambent.store.contract import scene_record
-
-    return scene_record(store).objects
+def test_states_hold_what_differs(box_site):
+    manifest = manifest_of(box_site)
+    baked, blue = manifest["states"]
+    assert [baked["name"], blue["name"]] == ["as baked", "blue"] and baked["changes"] == {}
+    changed = {manifest["tables"]["texture"][int(at)]["format"] for at in blue["changes"]["texture"]}
+    assert "rgba16float" in changed, "the light map"
+    assert all(blue["counts"][kind] >= count for kind, count in baked["counts"].items())
+    pieces = [piece for kind in blue["changes"].values() for piece in kind.values()]
+    assert all(hashlib.sha256(unpacked(box_site, piece)).hexdigest() == piece["sha256"] for piece in pieces)
 
 
 def test_a_frame_as_data_draws_what_the_renderer_draws(device, baked_box):
     renderer = Renderer(device, Store.open(baked_box))
     state = FrameState(renderer.scene.record.cameras[0], 64, 48)
-    from lambent.realtime.gpu.commands import Commands
-    from lambent.realtime.gpu.targets import pixels
-
     image, commands = renderer.display_image(state), Commands()
     target = renderer.target("display", state.size)
     renderer.frame(state, commands, target.create_view(), whole=True)
@@ -82,17 +87,17 @@ def test_a_frame_as_data_draws_what_the_renderer_draws(device, baked_box):
     assert np.array_equal(pixels(device, target), image)
 
 
-def test_a_site_is_replaced_and_nothing_else(adapter, baked_box, box_site, tmp_path):
+def test_a_site_is_replaced_and_nothing_else(adapter, blue_box, box_site, tmp_path):
     other = tmp_path / "letters"
     other.mkdir()
     (other / "to a friend.txt").write_text("dear")
     for wrong, message in ((other, "holds other files than a site"), (other / "to a friend.txt", "is no folder")):
         with pytest.raises(UserError, match=message):
-            lambent.export(baked_box, wrong)
+            lambent.export(blue_box, wrong)
     site = tmp_path / "site"
-    lambent.export(baked_box, site)
+    lambent.export(blue_box, site)
     (site / "data/old.gz").write_bytes(b"old")
-    made = lambent.export(baked_box, site)
+    made = lambent.export(blue_box, site)
     files = {file.name for file in (site / "data").iterdir()}
     assert "old.gz" not in files and len(files) == made["files"]
     assert made["bytes"] == sum(file.stat().st_size for file in (site / "data").iterdir()) < 2e6

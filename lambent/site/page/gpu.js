@@ -64,61 +64,119 @@ export class Frame {
     this.bytes = new Uint8Array(manifest.frame.bytes);
     /** @type {Record<string, any[]>} objects by kind and place */
     this.made = {};
-    this.width = this.height = 0;
+    this.width = this.height = this.asked = 0;
+    /** @type {Record<string, number>} objects that are made, by kind */
+    this.counts = {};
+    /** @type {Record<string, Record<string, any>>} contents other than the tables say, by kind and place */
+    this.changed = {};
+    /** @type {any[]} */
+    this.passes = [];
   }
 
   /** @param {any} manifest @param {GPUDevice} device @param {HTMLCanvasElement} canvas @param {import("./loading.js").Data} data */
   static async open(manifest, device, canvas, data) {
-    const frame = new Frame(manifest, device, canvas),
-      tables = manifest.tables,
-      made = frame.made;
-    const [modules, buffers, textures] = await Promise.all([
-      Promise.all(
-        tables.shader_module.map(async (/** @type {any} */ one) =>
-          device.createShaderModule({ code: await readText(one.file) }),
-        ),
-      ),
-      Promise.all(tables.buffer.map((/** @type {any} */ one) => frame.buffer(one, data))),
-      Promise.all(tables.texture.map((/** @type {any} */ one) => (one.data ? frame.texture(one, data) : null))),
-    ]);
-    Object.assign(made, { shader_module: modules, buffer: buffers, texture: textures });
-    made.sampler = (tables.sampler ?? []).map((/** @type {any} */ one) => device.createSampler(one));
-    made.bind_group_layout = tables.bind_group_layout.map((/** @type {any} */ one) =>
-      device.createBindGroupLayout(one),
-    );
-    made.pipeline_layout = tables.pipeline_layout.map((/** @type {any} */ one) =>
-      device.createPipelineLayout({
-        bindGroupLayouts: one.bindGroupLayouts.map((/** @type {number} */ at) => made.bind_group_layout[at]),
-      }),
-    );
-    made.render_pipeline = await Promise.all(
-      tables.render_pipeline.map((/** @type {any} */ one) =>
-        device.createRenderPipelineAsync({
-          ...one,
-          layout: made.pipeline_layout[one.layout],
-          vertex: { ...one.vertex, module: modules[one.vertex.module] },
-          ...(one.fragment ? { fragment: { ...one.fragment, module: modules[one.fragment.module] } } : {}),
-        }),
-      ),
-    );
+    const frame = new Frame(manifest, device, canvas);
+    await frame.show(0, data);
     return frame;
   }
 
-  /** @param {any} one @param {import("./loading.js").Data} data */
-  async buffer(one, data) {
-    const content = await data.read(one.data);
-    const size = Math.ceil(one.size / 4) * 4;
-    const made = this.device.createBuffer({ size, usage: one.usage | GPUBufferUsage.COPY_DST });
-    this.device.queue.writeBuffer(made, 0, content);
-    return made;
+  /** Show a state of the room, once what it needs has arrived. @param {number} number @param {import("./loading.js").Data} data */
+  async show(number, data) {
+    const { counts, changes, passes } = this.manifest.states[number];
+    const wanted = ++this.asked;
+    await this.load(counts, data);
+    /** @type {[string, number, any][]} kind, place and data of what differs from what is shown */
+    const differ = [];
+    for (const [kind, places] of Object.entries(this.changed)) {
+      for (const at of Object.keys(places)) differ.push([kind, Number(at), this.manifest.tables[kind][at].data]);
+    }
+    for (const [kind, places] of Object.entries(changes)) {
+      for (const [at, piece] of Object.entries(places)) differ.push([kind, Number(at), piece]);
+    }
+    const contents = await Promise.all(differ.map(([, , piece]) => data.read(piece)));
+    if (wanted !== this.asked) return; // another state was asked for meanwhile
+    differ.forEach(([kind, at], i) => this.write(kind, at, contents[i]));
+    [this.changed, this.passes] = [changes, passes];
+    if (this.width) this.fit(this.width, this.height);
   }
 
-  /** @param {any} one @param {import("./loading.js").Data} data */
-  async texture(one, data) {
-    const content = await data.read(one.data),
-      isDepth = one.format === "depth32float";
+  /** Make the objects of the tables up to these counts. @param {Record<string, number>} counts @param {import("./loading.js").Data} data */
+  async load(counts, data) {
+    const { device, made } = this;
+    /** @param {string} kind @returns {any[]} */
+    const lacking = (kind) => (this.manifest.tables[kind] ?? []).slice(made[kind]?.length ?? 0, counts[kind] ?? 0);
+    /** @param {string} kind @param {any[]} found */
+    const add = (kind, found) => (made[kind] = [...(made[kind] ?? []), ...found]);
+    const [modules, buffers, textures] = await Promise.all([
+      Promise.all(lacking("shader_module").map((one) => readText(one.file))),
+      Promise.all(lacking("buffer").map((one) => data.read(one.data))),
+      Promise.all(lacking("texture").map((one) => (one.data ? data.read(one.data) : null))),
+    ]);
+    add(
+      "shader_module",
+      modules.map((code) => device.createShaderModule({ code })),
+    );
+    for (const [kind, contents] of /** @type {[string, (ArrayBuffer | null)[]][]} */ ([
+      ["buffer", buffers],
+      ["texture", textures],
+    ])) {
+      const ones = lacking(kind),
+        first = made[kind]?.length ?? 0;
+      add(
+        kind,
+        ones.map((one) => (one.data ? this.create(kind, one) : null)),
+      );
+      contents.forEach((content, i) => content && this.write(kind, first + i, content));
+    }
+    add(
+      "sampler",
+      lacking("sampler").map((one) => device.createSampler(one)),
+    );
+    add(
+      "bind_group_layout",
+      lacking("bind_group_layout").map((one) => device.createBindGroupLayout(one)),
+    );
+    add(
+      "pipeline_layout",
+      lacking("pipeline_layout").map((one) =>
+        device.createPipelineLayout({
+          bindGroupLayouts: one.bindGroupLayouts.map((/** @type {number} */ at) => made.bind_group_layout[at]),
+        }),
+      ),
+    );
+    add(
+      "render_pipeline",
+      await Promise.all(
+        lacking("render_pipeline").map((one) =>
+          device.createRenderPipelineAsync({
+            ...one,
+            layout: made.pipeline_layout[one.layout],
+            vertex: { ...one.vertex, module: made.shader_module[one.vertex.module] },
+            ...(one.fragment ? { fragment: { ...one.fragment, module: made.shader_module[one.fragment.module] } } : {}),
+          }),
+        ),
+      ),
+    );
+    this.counts = counts;
+  }
+
+  /** A buffer or texture that content is written to. @param {string} kind @param {any} one */
+  create(kind, one) {
+    if (kind === "buffer") {
+      const size = Math.ceil(one.size / 4) * 4;
+      return this.device.createBuffer({ size, usage: one.usage | GPUBufferUsage.COPY_DST });
+    }
+    const isDepth = one.format === "depth32float";
     const extra = isDepth ? GPUTextureUsage.RENDER_ATTACHMENT : GPUTextureUsage.COPY_DST;
-    const made = this.device.createTexture({ ...one, usage: one.usage | extra });
+    return this.device.createTexture({ ...one, usage: one.usage | extra });
+  }
+
+  /** @param {string} kind @param {number} at @param {ArrayBuffer} content */
+  write(kind, at, content) {
+    const one = this.manifest.tables[kind][at],
+      made = this.made[kind][at];
+    if (kind === "buffer") return this.device.queue.writeBuffer(made, 0, content);
+    const isDepth = one.format === "depth32float";
     const target = isDepth
       ? this.device.createTexture({
           size: one.size,
@@ -140,7 +198,6 @@ export class Frame {
       offset += columns * rows * bytes * layers;
     }
     if (isDepth) this.fillDepth(target, made, layers);
-    return made;
   }
 
   /** Depth cannot be written, only drawn. @param {GPUTexture} from @param {GPUTexture} to @param {number} layers */
@@ -185,24 +242,31 @@ export class Frame {
     device.queue.submit([encoder.finish()]);
   }
 
-  /** Make what follows the size of the canvas. @param {number} width @param {number} height */
+  /** Follow the size of the canvas. @param {number} width @param {number} height */
   resize(width, height) {
     if (width === this.width && height === this.height) return;
-    [this.width, this.height] = [width, height];
-    const tables = this.manifest.tables,
-      made = this.made,
-      device = this.device;
     [this.canvas.width, this.canvas.height] = [width, height];
-    tables.texture.forEach((/** @type {any} */ one, /** @type {number} */ at) => {
-      if (one.data) return;
+    this.fit(width, height);
+  }
+
+  /** Make the textures of a size, all views and all groups. @param {number} width @param {number} height */
+  fit(width, height) {
+    const { made, device, counts } = this,
+      tables = this.manifest.tables;
+    const isOther = width !== this.width || height !== this.height;
+    [this.width, this.height] = [width, height];
+    tables.texture.slice(0, counts.texture).forEach((/** @type {any} */ one, /** @type {number} */ at) => {
+      if (one.data || (made.texture[at] && !isOther)) return;
       made.texture[at]?.destroy();
       const size = one.size.map((/** @type {any} */ n, /** @type {number} */ i) =>
         n === CANVAS ? [width, height][i] : n,
       );
       made.texture[at] = device.createTexture({ ...one, size });
     });
-    made.view = tables.view.map((/** @type {any} */ { texture, ...one }) => made.texture[texture].createView(one));
-    made.bind_group = tables.bind_group.map((/** @type {any} */ one) =>
+    made.view = tables.view
+      .slice(0, counts.view)
+      .map((/** @type {any} */ { texture, ...one }) => made.texture[texture].createView(one));
+    made.bind_group = tables.bind_group.slice(0, counts.bind_group).map((/** @type {any} */ one) =>
       device.createBindGroup({
         layout: made.bind_group_layout[one.layout],
         entries: one.entries.map((/** @type {any} */ { binding, buffer, view, sampler }) => ({
@@ -233,7 +297,7 @@ export class Frame {
     device.queue.writeBuffer(made.buffer[buffer], 0, this.bytes);
     const encoder = device.createCommandEncoder(),
       canvas = target.createView();
-    for (const one of manifest.passes) {
+    for (const one of this.passes) {
       const depth = one.depthStencilAttachment;
       const pass = encoder.beginRenderPass({
         colorAttachments: one.colorAttachments.map((/** @type {any} */ a) => ({

@@ -31,6 +31,7 @@ class Visit {
     this.frame = frame;
     this.camera = cameraOf(manifest.cameras);
     this.exposureEv = manifest.exposureEv;
+    this.state = 0;
     /** @type {Set<string>} */
     this.held = new Set();
     /** @type {Map<number, {x: number, y: number}>} */
@@ -117,6 +118,28 @@ class Visit {
 /** @param {KeyboardEvent} event */
 const keyOf = (event) => (event.key.length === 1 ? event.key.toLowerCase() : event.key);
 
+/** Buttons of the room's states. @param {Visit} visit @param {Data} data */
+function offerStates(visit, data) {
+  const names = visit.manifest.states.map((/** @type {{name: string}} */ state) => state.name);
+  const states = /** @type {HTMLElement} */ (document.getElementById("states"));
+  states.hidden = names.length < 2;
+  const buttons = names.map((/** @type {string} */ name, /** @type {number} */ number) => {
+    const button = document.createElement("button");
+    button.textContent = name;
+    button.setAttribute("aria-pressed", String(number === visit.state));
+    button.addEventListener("click", async () => {
+      visit.state = number;
+      buttons.forEach((/** @type {HTMLElement} */ one) => one.setAttribute("aria-pressed", String(one === button)));
+      await visit.frame.show(number, data).catch(failed);
+      message.textContent = fault ? message.textContent : "";
+      document.body.dataset.state = name;
+      visit.touch();
+    });
+    return button;
+  });
+  states.replaceChildren(...buttons);
+}
+
 /** Buttons of the scene's views, and the one that shares. @param {Visit} visit */
 function offer(visit) {
   const views = /** @type {HTMLElement} */ (document.getElementById("views"));
@@ -140,11 +163,15 @@ async function open(at) {
   const manifest = await readManifest();
   document.title = manifest.name;
   const device = await openDevice(manifest);
-  const pieces = [...manifest.tables.buffer, ...manifest.tables.texture].flatMap((one) => one.data ?? []);
+  const { counts } = manifest.states[0];
+  const pieces = ["buffer", "texture"].flatMap((kind) =>
+    manifest.tables[kind].slice(0, counts[kind]).flatMap((/** @type {any} */ one) => one.data ?? []),
+  );
   const all = [...new Map(pieces.map((piece) => [piece.file, piece.packed])).values()].reduce((a, b) => a + b, 0);
   const data = new Data((done) => {
     if (fault) return; // other files arrive after it
-    message.textContent = `Loading ${(done / MB).toFixed(1)} of ${(all / MB).toFixed(1)} MB…`;
+    const of = done > all ? "" : ` of ${(all / MB).toFixed(1)}`;
+    message.textContent = `Loading ${(done / MB).toFixed(1)}${of} MB…`;
   });
   const frame = await Frame.open(manifest, device, canvas, data);
   if (visit) visit.frame = frame;
@@ -154,6 +181,8 @@ async function open(at) {
     visit.follow();
   }
   if (at) visit.camera = at;
+  offerStates(visit, data);
+  if (visit.state) await frame.show(visit.state, data);
   device.lost.then((info) => {
     if (info.reason === "destroyed") return;
     message.textContent = "The graphics device was lost; loading the room again…";
