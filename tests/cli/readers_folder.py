@@ -29,14 +29,14 @@ from tests.materials.measured.measured_files import merl_bytes
 COARSE = DRAFT.changed(
     "coarse",
     geometry={"texels": 64},
-    light_map={"samples": (4, 4), "noise": 9.0, "max_depth": 3, "gather_samples": 8},
+    light_map={"samples": (4, 4), "noise": 9.0, "max_depth": 3, "gather_samples": 0},
     environment={"texels": 32},
     probe={"texels": 16, "samples": 1},
     answer={"patches": 48, "gather_rays": 64, "direct_samples": 8},
     light_field={"points": 25, "texels": 30},
     relighting={"depth": 2, "samples": 8, "paths": 8},
 )
-BRUSHED = Material(name="brushed", kd=0.05, lobes=(Lobe(k=0.9, mx=0.1, my=0.3, r0=0.9, alpha=0.5),))
+BRUSHED = Material(name="brushed", kd=0.05, lobes=(Lobe(k=0.9, mx=0.15, my=0.15, r0=0.9, alpha=0.5),))
 KEYS = [([0.4, 1.6, 1.4], [0.0, 1.0, -1.0]), ([-0.4, 1.5, 1.2], [0.2, 0.9, -1.0]), ([0.0, 1.4, 0.9], [0.0, 0.8, -1.0])]
 ROOM = """format = "lambent-scene"
 version = 1
@@ -124,9 +124,8 @@ def _materials(folder: Path) -> None:
     view = load_scene("builtin:teatray")
     edits = Session.new("builtin:teatray", view.cameras[0], {"nickel": view.materials["nickel"]}, size=(320, 240))
     edits.save(folder / "tray.edits.json")
-    half, turn = np.meshgrid(np.arange(30) / 30, np.arange(30) / 30, indexing="ij")
-    f = 0.1 + 20 * np.exp(-((half / 0.2) ** 2)) + 0 * turn
-    (folder / "chrome.binary").write_bytes(merl_bytes(np.repeat(np.repeat(f[..., None, None], 60, 2), 3, 3)))
+    peak = 0.1 + 20 * np.exp(-((np.arange(18) / 3.6) ** 2))  # over theta_h
+    (folder / "chrome.binary").write_bytes(merl_bytes(np.broadcast_to(peak[:, None, None, None], (18, 18, 36, 3))))
 
 
 def _pictures(folder: Path) -> None:

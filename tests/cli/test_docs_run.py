@@ -1,8 +1,8 @@
 """Every command and every piece of Python in README and docs is run, page by page, or says why it is not.
 
-Lines run as they are written, in a folder of small files under the names that the pages use. What "preview" and
-"normal" mean is coarse here, illuminances take few samples, and pictures in reports are small. Windows, which wait for
-a person, are not opened: their own tests do that.
+Lines run as they are written, in a folder of small files under the names that the pages use. What "draft", "preview"
+and "normal" mean is coarse here, illuminances take few samples, and pictures in reports are small. Windows, which wait
+for a person, are not opened: their own tests do that.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> list[object]:
     for module in (app, edit):
         monkeypatch.setattr(module, "run", lambda *what, **options: opened.append(what[0]))
     monkeypatch.setattr(
-        baking, "quality_named", lambda name: COARSE if name in ("preview", "normal") else quality_named(name)
+        baking, "quality_named", lambda name: COARSE if name in ("draft", "preview", "normal") else quality_named(name)
     )
     small = partial(material_preview.preview, size_px=32, spp=8)
     monkeypatch.setattr(material_preview, "preview", small)
