@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from lambent.api.windows import window as window
     from lambent.core.errors import UserError as UserError
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 _MODULES = {
     "Comparison": "api.pictures", "Fit": "api.tables", "Interreflection": "api.bakes", "Material": "api.materials",
     "Picture": "api.pictures", "Scene": "api.scenes", "Store": "api.stores", "Table": "api.tables",

@@ -20,7 +20,8 @@ TESTS = sorted((ROOT / "tests").rglob("*.py"))
 # A room may import rooms of a lower floor, and itself.
 FLOOR = {
     "core": 0, "materials": 1, "scenes": 2, "store": 3, "baked": 3.5, "baking": 4, "realtime": 4, "editing": 4,
-    "traced": 5, "viewer": 6, "render": 7, "site": 7.5, "published": 7, "report": 8, "bench": 8, "demo": 8, "api": 8.5, "cli": 9,
+    "traced": 5, "viewer": 6, "render": 7, "published": 7, "site": 7.5, "report": 8, "bench": 8, "demo": 8, "api": 8.5,
+    "cli": 9,
 }  # fmt: skip
 # Libraries that only some rooms may import.
 ONLY_IN = {

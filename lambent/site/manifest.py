@@ -12,14 +12,18 @@ from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from lambent.realtime.gpu.commands import Commands, RenderPass
 from lambent.realtime.gpu.described import DescribedDevice, Made
 from lambent.realtime.gpu.pipelines import VERTEX_FLOATS
 from lambent.realtime.gpu.read_back import BLOCKS, buffer_bytes, texel, texture_levels
-from lambent.site.chunks import Chunks, Packing
+from lambent.site.chunks import TALLEST_PX, Chunks, Packing
 
 VERTEX, INDEX = 0x20, 0x10  # usages of buffers
 FACES = 6  # of a cube
+COLOURS = "rgba8unorm-srgb"  # of textures
 CANVAS = "canvas"  # stands for the texture that is shown, and for the size of textures that follow it
 
 
@@ -107,6 +111,8 @@ class Manifest:
         levels = texture_levels(self._device, texture)
         if texture.format in BLOCKS:
             return self.chunks.add(b"".join(levels))
+        if texture.format == COLOURS and (picture := _picture(texture, levels)):
+            return self.chunks.add_picture(picture)
         word, channels = texel(texture.format)
         layers = texture.size[2]
         runs = [(len(level) // word, len(level) // word // layers * FACES if layers > FACES else 0) for level in levels]
@@ -146,6 +152,15 @@ class Manifest:
                 found[stage] = {**found[stage], "module": self.refer(found[stage]["module"])}
                 found[stage] = {key: value for key, value in found[stage].items() if value != ""}
         return dict(_camel({**found, "layout": self.refer(found["layout"])}))
+
+
+def _picture(texture: Any, levels: list[bytes]) -> list[NDArray[np.uint8]]:
+    """The levels (rows, columns, 4) of a texture that fits into a picture; else none."""
+    width, height, layers = texture.size
+    if layers > 1 or 2 * height > TALLEST_PX or width > TALLEST_PX:
+        return []
+    sizes = [(max(1, height >> level), max(1, width >> level), 4) for level in range(len(levels))]
+    return [np.frombuffer(level, np.uint8).reshape(size) for level, size in zip(levels, sizes, strict=True)]
 
 
 def _attached(one: RenderPass) -> list[Any]:

@@ -45,7 +45,7 @@ def test_help_shows_an_example_and_json(lambent, command):
     outcome = lambent(command, "--help")
     assert (outcome.code, outcome.err) == (0, "")
     assert f"Example: lambent {command}" in outcome.out
-    assert "--json" in outcome.out or command in ("walk", "view", "edit", "demo")
+    assert "--json" in outcome.out or command in ("walk", "view", "edit", "demo", "serve")
 
 
 def test_no_command_shows_help(lambent):

@@ -116,7 +116,7 @@ export class Frame {
       "shader_module",
       modules.map((code) => device.createShaderModule({ code })),
     );
-    for (const [kind, contents] of /** @type {[string, (ArrayBuffer | null)[]][]} */ ([
+    for (const [kind, contents] of /** @type {[string, (ArrayBuffer | ImageBitmap | null)[]][]} */ ([
       ["buffer", buffers],
       ["texture", textures],
     ])) {
@@ -166,15 +166,16 @@ export class Frame {
       const size = Math.ceil(one.size / 4) * 4;
       return this.device.createBuffer({ size, usage: one.usage | GPUBufferUsage.COPY_DST });
     }
-    const isDepth = one.format === "depth32float";
-    const extra = isDepth ? GPUTextureUsage.RENDER_ATTACHMENT : GPUTextureUsage.COPY_DST;
+    const isDrawn = one.format === "depth32float" || one.data.picture;
+    const extra = GPUTextureUsage.COPY_DST | (isDrawn ? GPUTextureUsage.RENDER_ATTACHMENT : 0);
     return this.device.createTexture({ ...one, usage: one.usage | extra });
   }
 
-  /** @param {string} kind @param {number} at @param {ArrayBuffer} content */
+  /** @param {string} kind @param {number} at @param {ArrayBuffer | ImageBitmap} content */
   write(kind, at, content) {
     const one = this.manifest.tables[kind][at],
       made = this.made[kind][at];
+    if (content instanceof ImageBitmap) return this.copy(one, made, content);
     if (kind === "buffer") return this.device.queue.writeBuffer(made, 0, content);
     const isDepth = one.format === "depth32float";
     const target = isDepth
@@ -198,6 +199,17 @@ export class Frame {
       offset += columns * rows * bytes * layers;
     }
     if (isDepth) this.fillDepth(target, made, layers);
+  }
+
+  /** The levels of a picture, one below the other. @param {any} one @param {GPUTexture} to @param {ImageBitmap} source */
+  copy(one, to, source) {
+    const [width, height] = one.size;
+    for (let level = 0, y = 0; level < (one.mipLevelCount ?? 1); level++) {
+      const size = [Math.max(1, width >> level), Math.max(1, height >> level)];
+      const target = { texture: to, mipLevel: level };
+      this.device.queue.copyExternalImageToTexture({ source, origin: [0, y] }, target, size);
+      y += size[1];
+    }
   }
 
   /** Depth cannot be written, only drawn. @param {GPUTexture} from @param {GPUTexture} to @param {number} layers */

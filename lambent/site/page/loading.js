@@ -30,7 +30,7 @@ export async function readText(file) {
 }
 
 /** @typedef {{word: 1|2|4, channels: number, runs: [number, number][]}} Packing */
-/** @typedef {{file: string, bytes: number, packed: number, sha256: string, packing?: Packing}} Piece */
+/** @typedef {{file: string, bytes: number, packed: number, sha256: string, packing?: Packing, picture?: boolean}} Piece */
 
 /** The data of differences: see lambent/site/chunks.py. @param {Uint8Array} bytes @param {Packing} packing @returns {ArrayBuffer} */
 export function unpack(bytes, { word, channels, runs }) {
@@ -65,20 +65,34 @@ export class Data {
   constructor(report) {
     this.report = report;
     this.done = 0;
-    /** @type {Map<string, Promise<ArrayBuffer>>} */
+    /** @type {Map<string, Promise<ArrayBuffer | ImageBitmap>>} */
     this.files = new Map();
   }
 
-  /** @param {Piece} piece @returns {Promise<ArrayBuffer>} */
+  /** @param {Piece} piece @returns {Promise<ArrayBuffer | ImageBitmap>} */
   read(piece) {
     let found = this.files.get(piece.file);
     if (!found) this.files.set(piece.file, (found = this.unpacked(piece)));
     return found;
   }
 
-  /** @param {Piece} piece @returns {Promise<ArrayBuffer>} */
+  /** @param {Piece} piece @param {Response} answer @returns {Promise<ImageBitmap>} */
+  async picture(piece, answer) {
+    let found;
+    try {
+      found = await createImageBitmap(await answer.blob(), { premultiplyAlpha: "none", colorSpaceConversion: "none" });
+    } catch {
+      throw new SiteError(`${piece.file} is damaged; export the site again`);
+    }
+    this.report((this.done += piece.packed));
+    return found;
+  }
+
+  /** @param {Piece} piece @returns {Promise<ArrayBuffer | ImageBitmap>} */
   async unpacked(piece) {
-    const body = (await fetched(piece.file)).body;
+    const answer = await fetched(piece.file);
+    if (piece.picture) return this.picture(piece, answer);
+    const body = answer.body;
     if (!body) throw new SiteError(`${piece.file} is empty`);
     let data;
     try {
