@@ -14,6 +14,7 @@ NEXT = """next:
   lambent walk {out}/store
   lambent edit {out}/measured/brushed_aluminium.txt {out}/materials/brushed_aluminium.json
   lambent fit YOUR_MEASUREMENT --lobes auto -o yours.json --report yours.html"""
+SITE = "\n  lambent serve {out}/site"
 
 
 def command(
@@ -25,7 +26,7 @@ def command(
     """Measure four materials, fit them, place them in a room, bake it and walk through it.
 
     Opens the window where there is a display; otherwise, or with --headless, writes stills, a film, a comparison with
-    the path tracer and demo.json. After an interruption, the same command continues.
+    the path tracer, a web site and demo.json. After an interruption, the same command continues.
 
     Example: lambent demo --headless --quick
     """
@@ -38,9 +39,11 @@ def command(
         if windowless:
             flow.walk()
             flow.compare(scene)
+            flow.share()
     report = flow.finish()
     rows = ((name, f"{seconds:.1f} s") for name, seconds in report["seconds"].items())
-    show(report, f"{table(rows)}\n\n{out / 'demo.json'}\n\n{NEXT.format(out=out)}", json)
+    ahead = (NEXT + SITE * windowless).format(out=out)
+    show(report, f"{table(rows)}\n\n{out / 'demo.json'}\n\n{ahead}", json)
     if not windowless:
         from lambent.viewer.app import run
 

@@ -46,6 +46,7 @@ from lambent.render import Settings, images, write_frames
 from lambent.scenes.camera_paths import camera_at, path_length
 from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Scene
+from lambent.site.export import export
 from lambent.store.store import Store
 
 SCENE = "builtin:room"
@@ -234,6 +235,12 @@ class Flow:
         ):
             self.report["compare"][name], difference = compare(reference, test, radiance=True)
             write_image(folder / f"{name}.png", srgb_decode(difference))
+
+    def share(self) -> None:
+        """The room as a web site, in which a browser walks."""
+        with self._timed("site"):
+            made = export(Store.open(self.store_path), self.out / "site", self.progress)
+        self.report["site"] = {"bytes": made["bytes"], "files": made["files"]}
 
     @cached_property
     def _renderer(self) -> Renderer:

@@ -78,9 +78,13 @@ def test_the_flow_ends_with_everything_it_names(tmp_path: Path) -> None:
     scene = flow.prepare()
     flow.walk()
     flow.compare(scene)
+    flow.share()
     flow.finish()
     report = json.loads((tmp_path / "demo.json").read_text())
     _check_materials(tmp_path, report)
+    manifest = json.loads((tmp_path / "site/manifest.json").read_text())
+    assert manifest["name"] == "room" and [camera["name"] for camera in manifest["cameras"]]
+    assert report["site"]["files"] == len(list((tmp_path / "site/data").iterdir()))
     assert not [a.name for a in Store.open(flow.store_path).artefacts() if not a.complete]
     for k in range(STILLS):
         picture = read_encoded(tmp_path / f"walk_{k + 1}.png")
