@@ -38,7 +38,7 @@ from lambent.store.light_groups import light_groups
 from lambent.store.store import Store
 
 Note = Callable[[str], None]
-FORMAT, VERSION = "lambent-site", 1
+FORMAT, VERSION, UNFINISHED = "lambent-site", 1, 0
 HEAD = b'{"format":"lambent-site"'  # of a manifest
 SIZE = 640, 360  # of the frame that is described; the page's follows its canvas
 POSTER = 1280, 720  # a picture for browsers without WebGPU, and while the room loads
@@ -64,6 +64,9 @@ def export(store: Store, folder: Path, progress: Progress = silent, note: Note =
     if not baked.record.cameras:
         raise UserError("has no camera", file=store.folder, hint="add [[cameras]] to its scene.toml")
     folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / "manifest.json", json.dumps({"format": FORMAT, "version": UNFINISHED}, separators=(",", ":")))
+    for part in ("data", "shaders"):
+        shutil.rmtree(folder / part, ignore_errors=True)
     device = DescribedDevice(open_device(device_needs(baked)))
     renderer = Renderer(device, baked)
     saved = read_views(store.folder).cameras
@@ -102,8 +105,6 @@ def _check(folder: Path) -> None:
         manifest = folder / "manifest.json"
         if not manifest.is_file() or not read_head(manifest, len(HEAD)).startswith(HEAD):
             raise UserError("holds other files than a site", file=folder, hint="choose a new folder")
-        for part in ("data", "shaders"):
-            shutil.rmtree(folder / part, ignore_errors=True)
 
 
 def _states(

@@ -87,6 +87,18 @@ def test_a_frame_as_data_draws_what_the_renderer_draws(device, baked_box):
     assert np.array_equal(pixels(device, target), image)
 
 
+def test_an_interrupted_export_is_no_site_and_is_done_again(adapter, blue_box, box_site, tmp_path):
+    def stop(done, total, what):
+        if done:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        lambent.export(blue_box, tmp_path, progress=stop)
+    assert manifest_of(tmp_path) == {"format": "lambent-site", "version": 0} and not (tmp_path / "index.html").exists()
+    lambent.export(blue_box, tmp_path)
+    assert manifest_of(tmp_path) == manifest_of(box_site)
+
+
 def test_a_site_is_replaced_and_nothing_else(adapter, blue_box, box_site, tmp_path):
     other = tmp_path / "letters"
     other.mkdir()

@@ -18,6 +18,7 @@ async function fetched(file) {
 /** @returns {Promise<any>} the manifest, of a version that this page reads */
 export async function readManifest() {
   const found = await (await fetched("manifest.json")).json();
+  if (found.version === 0) throw new SiteError("This site is unfinished; export it again");
   if (found.format !== "lambent-site" || found.version !== 1) {
     throw new SiteError(`manifest.json is ${found.format} ${found.version}; this page reads lambent-site 1`);
   }
