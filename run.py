@@ -28,7 +28,8 @@ BLENDER = "bpy==5.0.1"  # Blender as a package, for Python 3.11; tests that need
 BLENDER_PACKAGES = ["libsm6", "libgl1", "libxfixes3", "libxi6", "libxkbcommon0", "libxrender1"]  # that it loads
 # Of npm: the glTF validator, and what checks the JavaScript of sites; tests that need one skip where it is not.
 NODE_PACKAGES = ("gltf-validator@2.0.0-dev.3.10", "typescript@5.9.3", "@webgpu/types@0.1.74", "prettier@3.6.2")
-WINDOW_TEST_PACKAGES = {"Xvfb": "xvfb", "xdotool": "xdotool", "chromium": "chromium"}
+WINDOW_TEST_PACKAGES = {"Xvfb": "xvfb", "xdotool": "xdotool"}
+BROWSER = "chromium"  # of Debian; elsewhere the tests take one that is there, or skip
 
 
 class Stop(Exception):
@@ -96,6 +97,7 @@ def set_up(for_tests):
     if for_tests:
         install_node_packages()
         install_blender()
+        install_browser()
     install_system_parts(for_tests)
     STAMP.write_text(json.dumps({"wanted": wanted, "tests": for_tests}), encoding="utf-8")
 
@@ -160,6 +162,12 @@ def install_blender():
         say(f"pip could not install {BLENDER}; the tests that need it will skip")
     elif not works([PYTHON, "-c", "import bpy"]):
         apt_install(BLENDER_PACKAGES)
+
+
+def install_browser():
+    """By itself: where the system has no such package, the others are installed all the same."""
+    if sys.platform.startswith("linux") and not shutil.which(BROWSER) and not apt_install([BROWSER]):
+        say(f"{BROWSER} could not be installed; the tests that open sites skip without a browser")
 
 
 def install_system_parts(for_tests):
