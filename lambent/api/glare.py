@@ -71,10 +71,10 @@ def _fisheye(
     store: Store, camera: str | None, note: Note | None, progress: Wanted, settings: dict[str, Any]
 ) -> tuple[Floats, View]:
     from lambent.core.views.projections import Projection
-    from lambent.render import Settings
     from lambent.render.output import drawn_view
 
-    wanted = Settings(SIDE_PX, SIDE_PX, projection=Projection.fisheye, **settings)
+    given = {"light": None, "variant": "", **settings}
+    wanted = store._settings((SIDE_PX, SIDE_PX), projection=Projection.fisheye, **given)
     with needing_extras(), progress_of(progress) as bar:
         radiance, seen = drawn_view(store.arrays, camera, wanted, note=note or (lambda text: None), progress=bar)
     return radiance, wanted.view_of(seen)

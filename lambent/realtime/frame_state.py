@@ -164,6 +164,12 @@ def quantity_of(show: str) -> Quantity:
     return QUANTITIES.get(show, LUMINANCE)
 
 
+def near_of(bounds: ArrayLike) -> float:
+    """Near plane, m, of a scene with the box `bounds` (2, 3), m: a ten-thousandth of its size, within limits."""
+    low, high = np.asarray(bounds)
+    return float(np.clip(1e-4 * np.linalg.norm(high - low), 1e-3, 0.1))
+
+
 def frame_data(state: FrameState, bounds: ArrayLike) -> Record:
     """Record of FRAME_DTYPE; `bounds` (2, 3) is the box of the scene, m."""
     camera, width, height = state.camera, state.width, state.height
@@ -173,8 +179,7 @@ def frame_data(state: FrameState, bounds: ArrayLike) -> Record:
         turn = float(radical_inverse(index, 2)[0])
         if state.antialias:
             jitter = (turn - 0.5, float(radical_inverse(index, 3)[0]) - 0.5)
-    low, high = np.asarray(bounds)
-    near_m = state.near_m or float(np.clip(1e-4 * np.linalg.norm(high - low), 1e-3, 0.1))
+    near_m = state.near_m or near_of(bounds)
     across, up, forward = image_plane(camera, width, height)
     data = np.zeros((), FRAME_DTYPE)
     data["clip_from_world"] = clip_from_world(camera, width, height, near_m, jitter).T  # WGSL stores columns

@@ -60,6 +60,7 @@ class Chunks:
         self._folder = folder / "data"
         self._folder.mkdir(parents=True, exist_ok=True)
         self.files: dict[str, int] = {}  # bytes transferred, by name
+        self._pictures: dict[str, dict[str, Any]] = {}  # by the hash of their texels
 
     def add_picture(self, levels: Sequence[NDArray[np.uint8]]) -> dict[str, Any]:
         """MIP levels (rows, columns, 4) of a picture, one below the other in a WebP file; alpha stays exact."""
@@ -68,6 +69,12 @@ class Chunks:
         for level in levels:
             tall[at : at + len(level), : level.shape[1]] = level
             at += len(level)
+        key = hashlib.sha256(tall.tobytes()).hexdigest()
+        if key not in self._pictures:
+            self._pictures[key] = self._written(tall)
+        return self._pictures[key]
+
+    def _written(self, tall: NDArray[np.uint8]) -> dict[str, Any]:
         made = io.BytesIO()
         Image.fromarray(tall).save(made, "webp", quality=PICTURE_QUALITY, exact=True)
         content = made.getvalue()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import partial
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -19,8 +19,7 @@ from lambent.core.inputs import read_head
 from lambent.core.light.exposure import metered
 from lambent.core.light.light_mix import MixTrack
 from lambent.core.progress import Progress, silent, tracked
-from lambent.core.views.camera import Camera
-from lambent.realtime.frame_state import FrameState, frame_data
+from lambent.realtime.frame_state import FrameState, frame_data, near_of
 from lambent.realtime.gpu.commands import Commands
 from lambent.realtime.gpu.described import DescribedDevice
 from lambent.realtime.gpu.device import open_device
@@ -31,7 +30,7 @@ from lambent.realtime.resources import device_needs
 from lambent.render.applied_materials import AppliedMaterials
 from lambent.render.output import ignore
 from lambent.scenes.scene import Variant
-from lambent.site.manifest import Manifest
+from lambent.site.manifest import Manifest, camel
 from lambent.store.kept.states import lamps_of, variants_of
 from lambent.store.kept.views import read_views
 from lambent.store.light_groups import light_groups
@@ -72,22 +71,23 @@ def export(store: Store, folder: Path, progress: Progress = silent, note: Note =
     saved = read_views(store.folder).cameras
     cameras = [*baked.record.cameras, *(one for one in saved if one.name not in {c.name for c in baked.record.cameras})]
     state = FrameState(cameras[0], *SIZE, planar="off")
+    exposure_ev = baked.record.exposure_ev
+    if exposure_ev is None:
+        exposure_ev = metered(renderer.image(state)) or 0.0
+    _write_poster(renderer, replace(state, exposure_ev=exposure_ev, planar="auto"), folder / "poster.jpg")
     shown = renderer.target(DISPLAY, SIZE).create_view()
     manifest, states = Manifest(device, folder, SIZE, shown), []
     for name, now in tracked(list(_states(store, renderer, state, note)), progress, "states"):
         commands = Commands()
         renderer.frame(now(), commands, shown, whole=True)
         states.append(manifest.state(name, commands))
-    exposure_ev = baked.record.exposure_ev
-    if exposure_ev is None:
-        exposure_ev = metered(renderer.image(state)) or 0.0
     document = {
-        "format": FORMAT, "version": VERSION, "name": baked.record.name, "cameras": [_camera(one) for one in cameras],
+        "format": FORMAT, "version": VERSION, "name": baked.record.name,
+        "cameras": [camel(asdict(one)) for one in cameras],
         "bounds": np.asarray(baked.record.bounds).tolist(), "exposureEv": exposure_ev, "unit": baked.unit,
         "frame": _frame(manifest.refer(renderer.frame_buffer), state, baked.record.bounds),
         "tables": manifest.tables, "states": states,
     }  # fmt: skip
-    _write_poster(renderer, replace(state, exposure_ev=exposure_ev, planar="auto"), folder / "poster.jpg")
     write_text(folder / "manifest.json", json.dumps(document, separators=(",", ":"), allow_nan=False))
     _copy_page(folder)
     return {
@@ -134,21 +134,13 @@ def _write_poster(renderer: Renderer, state: FrameState, file: Path) -> None:
     Image.fromarray(renderer.still(replace(state, width=width, height=height))).save(file, quality=85)
 
 
-def _camera(one: Camera) -> dict[str, Any]:
-    return {
-        "name": one.name, "position": one.position, "target": one.target, "up": one.up, "fovYDeg": one.fov_y_deg
-    }  # fmt: skip
-
-
 def _frame(place: int, state: FrameState, bounds: Any) -> dict[str, Any]:
     """The uniform of a frame: its buffer, its bytes in a fresh frame, and where the camera's fields are."""
     data = frame_data(state, bounds)
     fields: Any = FRAME_DTYPE.fields
     of_camera = ("clip_from_world", "eye", "across", "up", "forward", "exposure")
-    low, high = np.asarray(bounds)
-    near_m = float(np.clip(1e-4 * np.linalg.norm(high - low), 1e-3, 0.1))
     return {
-        "buffer": place, "bytes": list(data.tobytes()), "nearM": near_m,
+        "buffer": place, "bytes": list(data.tobytes()), "nearM": near_of(bounds),
         "offsets": {name: fields[name][1] for name in of_camera},
     }  # fmt: skip
 

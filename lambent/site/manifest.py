@@ -71,11 +71,11 @@ class Manifest:
         return self._places[id(one)]
 
     def _pass(self, one: RenderPass) -> dict[str, Any]:
-        colours = [{**_camel(a), "view": self._view_or_canvas(a["view"])} for a in one.attachments["color_attachments"]]
+        colours = [{**camel(a), "view": self._view_or_canvas(a["view"])} for a in one.attachments["color_attachments"]]
         depth = one.attachments.get("depth_stencil_attachment")
         found: dict[str, Any] = {"colorAttachments": colours}
         if depth is not None:
-            found["depthStencilAttachment"] = {**_camel(depth), "view": self.refer(depth["view"])}
+            found["depthStencilAttachment"] = {**camel(depth), "view": self.refer(depth["view"])}
         found["commands"] = [[_word(name), *map(self._argument, given)] for name, given in one.commands]
         return found
 
@@ -92,7 +92,7 @@ class Manifest:
         size, drawn = tuple(made.one.size), id(made.one) in self._drawn
         follows = drawn and size[:2] == self._size
         found = {
-            **_camel(made.descriptor), "size": [CANVAS, CANVAS, *size[2:]] if follows else list(size),
+            **camel(made.descriptor), "size": [CANVAS, CANVAS, *size[2:]] if follows else list(size),
             "format": made.one.format,
         }  # fmt: skip
         return found if drawn else {**found, "data": self._content(made.one)}
@@ -120,13 +120,13 @@ class Manifest:
 
     def _view(self, made: Made) -> dict[str, Any]:
         descriptor = {key: value for key, value in made.descriptor.items() if key != "texture"}
-        return {"texture": self.refer(made.descriptor["texture"]), **_camel(descriptor)}
+        return {"texture": self.refer(made.descriptor["texture"]), **camel(descriptor)}
 
     def _sampler(self, made: Made) -> dict[str, Any]:
-        return dict(_camel(made.descriptor))
+        return dict(camel(made.descriptor))
 
     def _bind_group_layout(self, made: Made) -> dict[str, Any]:
-        return dict(_camel(made.descriptor))
+        return dict(camel(made.descriptor))
 
     def _bind_group(self, made: Made) -> dict[str, Any]:
         entries = []
@@ -151,7 +151,7 @@ class Manifest:
             if stage in found:
                 found[stage] = {**found[stage], "module": self.refer(found[stage]["module"])}
                 found[stage] = {key: value for key, value in found[stage].items() if value != ""}
-        return dict(_camel({**found, "layout": self.refer(found["layout"])}))
+        return dict(camel({**found, "layout": self.refer(found["layout"])}))
 
 
 def _picture(texture: Any, levels: list[bytes]) -> list[NDArray[np.uint8]]:
@@ -168,11 +168,11 @@ def _attached(one: RenderPass) -> list[Any]:
     return [a["view"] for a in one.attachments["color_attachments"]] + ([depth["view"]] if depth else [])
 
 
-def _camel(value: Any) -> Any:
+def camel(value: Any) -> Any:
     """A descriptor of wgpu in the words of WebGPU: keys in camelCase, but for the constants of shaders."""
     if isinstance(value, dict):
-        return {_word(key): one if key == "constants" else _camel(one) for key, one in value.items()}
-    return [_camel(one) for one in value] if isinstance(value, list | tuple) else value
+        return {_word(key): one if key == "constants" else camel(one) for key, one in value.items()}
+    return [camel(one) for one in value] if isinstance(value, list | tuple) else value
 
 
 def _word(snake: str) -> str:

@@ -12,6 +12,8 @@ import pytest
 
 import lambent
 from lambent.core.errors import UserError
+from lambent.core.pictures.images import read_encoded
+from lambent.core.pictures.metrics import tile_means
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.gpu.commands import Commands
 from lambent.realtime.gpu.targets import pixels
@@ -62,6 +64,16 @@ def test_the_frame_has_the_faces_out_of_view(baked_box, box_site):
     depth = manifest_of(box_site)["states"][0]["passes"][0]
     drawn = sum(command[1] for command in depth["commands"] if command[0] == "drawIndexed")
     assert drawn == 3 * faces
+
+
+def test_the_poster_shows_the_room_as_baked(device, blue_box, box_site):
+    """Not in the light of the last state, whose wall is blue."""
+    renderer = Renderer(device, Store.open(blue_box))
+    exposure_ev = manifest_of(box_site)["exposureEv"]
+    state = FrameState(renderer.scene.record.cameras[0], 1280, 720, exposure_ev=exposure_ev)
+    wanted = renderer.still(state) / 255
+    error = tile_means(np.abs(read_encoded(box_site / "poster.jpg") - wanted).mean(axis=-1))
+    assert error.max() < 0.03
 
 
 def test_states_hold_what_differs(box_site):
