@@ -19,7 +19,7 @@ from lambent.core.inputs import read_head
 from lambent.core.light.exposure import metered
 from lambent.core.light.light_mix import MixTrack
 from lambent.core.progress import Progress, silent, tracked
-from lambent.realtime.frame_state import FrameState, frame_data, near_of
+from lambent.realtime.frame_state import VIEW_TRANSFORMS, FrameState, frame_data, near_of
 from lambent.realtime.gpu.commands import Commands
 from lambent.realtime.gpu.described import DescribedDevice
 from lambent.realtime.gpu.device import open_device
@@ -85,6 +85,7 @@ def export(store: Store, folder: Path, progress: Progress = silent, note: Note =
         "format": FORMAT, "version": VERSION, "name": baked.record.name,
         "cameras": [camel(asdict(one)) for one in cameras],
         "bounds": np.asarray(baked.record.bounds).tolist(), "exposureEv": exposure_ev, "unit": baked.unit,
+        "viewTransform": VIEW_TRANSFORMS[state.view_transform],
         "frame": _frame(manifest.refer(renderer.frame_buffer), state, baked.record.bounds),
         "tables": manifest.tables, "states": states,
     }  # fmt: skip
@@ -138,7 +139,7 @@ def _frame(place: int, state: FrameState, bounds: Any) -> dict[str, Any]:
     """The uniform of a frame: its buffer, its bytes in a fresh frame, and where the camera's fields are."""
     data = frame_data(state, bounds)
     fields: Any = FRAME_DTYPE.fields
-    of_camera = ("clip_from_world", "eye", "across", "up", "forward", "exposure")
+    of_camera = ("clip_from_world", "eye", "across", "up", "forward", "exposure", "view_transform")
     return {
         "buffer": place, "bytes": list(data.tobytes()), "nearM": near_of(bounds),
         "offsets": {name: fields[name][1] for name in of_camera},

@@ -32,7 +32,8 @@ SIZE = 96, 64
 VIEWPORT = {"width": 320, "height": 240}
 EYES = ((0, 1, 3.4), (0.3, 0.4, 0.2), (-0.6, 1.2, 0.5), (0.5, 1.5, -0.4), (0, 0.3, 0.8), (0.7, 0.2, -0.7))
 PIXELS = """async ([cameras, width, height]) => {
-  const { readManifest, Data } = await import("/loading.js"), { Frame, openDevice } = await import("/gpu.js");
+  const { readManifest, Data } = await import("/loading.js");
+  const { Frame } = await import("/frame.js"), { openDevice } = await import("/device.js");
   const manifest = await readManifest(), device = await openDevice(manifest), faults = [];
   device.addEventListener("uncapturederror", (event) => faults.push(event.error.message));
   const data = new Data(() => {});
@@ -42,7 +43,7 @@ PIXELS = """async ([cameras, width, height]) => {
   for (const state of [0, 1, 0]) {
     await frame.show(state, data);
     for (const camera of cameras) {
-      const bytes = await frame.pixels(camera, manifest.exposureEv);
+      const bytes = await frame.pixels(camera);
       found.push(btoa(String.fromCharCode(...bytes)));
     }
   }

@@ -1,7 +1,8 @@
 // The page: loads the room, shows it, and follows the visitor.
 
 import { KEYS, look, walk } from "./camera.js";
-import { Frame, openDevice } from "./gpu.js";
+import { openDevice } from "./device.js";
+import { Frame } from "./frame.js";
 import { Data, readManifest, SiteError } from "./loading.js";
 
 /** @typedef {import("./camera.js").Camera} Camera */
@@ -30,7 +31,6 @@ class Visit {
     this.manifest = manifest;
     this.frame = frame;
     this.camera = cameraOf(manifest.cameras);
-    this.exposureEv = manifest.exposureEv;
     this.state = 0;
     /** @type {Set<string>} */
     this.held = new Set();
@@ -59,7 +59,7 @@ class Visit {
       this.touch();
     }
     this.lastMs = ms;
-    this.frame.draw(this.camera, this.exposureEv);
+    this.frame.draw(this.camera);
     document.body.dataset.frames = String(++this.frames);
     document.body.dataset.camera = this.address();
   }

@@ -1,9 +1,10 @@
-// Makes the objects of a manifest on a device, and draws its frame.
+// The objects of WebGPU that a manifest describes, and their contents.
 
-import { readText, SiteError } from "./loading.js";
-import { frameOf } from "./camera.js";
+import { readText } from "./loading.js";
 
-const CANVAS = "canvas";
+/** @typedef {import("./loading.js").Data} Data */
+
+export const CANVAS = "canvas";
 const WORDS = ["rgb10a2unorm", "rgb9e5ufloat", "depth32float"]; // of 4 bytes a texel
 
 /** Bytes of a block, and its texels a side. @param {string} format @returns {[number, number]} */
@@ -23,67 +24,27 @@ override LAYER: i32;
     return textureLoad(depths, vec2i(at.xy), LAYER, 0).x;
 }`;
 
-/** What a browser lacks, in a line; null if nothing. @param {any} manifest @param {GPUAdapter} adapter */
-function lacking(manifest, adapter) {
-  const blocks = manifest.tables.texture.some((/** @type {any} */ one) => one.format.startsWith("bc"));
-  return blocks && !adapter.features.has("texture-compression-bc") ? "compressed textures (BC)" : null;
-}
-
-/** @param {any} manifest @returns {Promise<GPUDevice>} */
-export async function openDevice(manifest) {
-  const adapter = await navigator.gpu?.requestAdapter({ powerPreference: "high-performance" });
-  if (!adapter)
-    throw new SiteError("This browser has no WebGPU: Chrome, Edge or Safari of 2025 or later show the room.");
-  const lack = lacking(manifest, adapter);
-  if (lack) throw new SiteError(`This graphics adapter has no ${lack}.`);
-  /** @type {GPUFeatureName[]} */
-  const wanted = ["texture-compression-bc", "float32-filterable"];
-  const most = Math.max(...manifest.tables.buffer.map((/** @type {any} */ one) => one.size), 1 << 27);
-  return adapter.requestDevice({
-    requiredFeatures: wanted.filter((one) => adapter.features.has(one)),
-    requiredLimits: {
-      maxBufferSize: Math.min(Math.max(most, 256 << 20), adapter.limits.maxBufferSize),
-      maxStorageBufferBindingSize: Math.min(most, adapter.limits.maxStorageBufferBindingSize),
-      maxTextureDimension2D: adapter.limits.maxTextureDimension2D,
-    },
-  });
-}
-
-/** The frame of a manifest. `open` makes one. */
-export class Frame {
-  /** @param {any} manifest @param {GPUDevice} device @param {HTMLCanvasElement} canvas */
-  constructor(manifest, device, canvas) {
+/** Objects by kind and place, as in the tables of a manifest. */
+export class Objects {
+  /** @param {any} manifest @param {GPUDevice} device */
+  constructor(manifest, device) {
     this.manifest = manifest;
     this.device = device;
-    this.canvas = canvas;
-    const context = canvas.getContext("webgpu");
-    if (!context) throw new SiteError("This browser shows no WebGPU in a page.");
-    this.context = context;
-    const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC;
-    context.configure({ device, format: "rgba8unorm", alphaMode: "opaque", usage });
-    this.bytes = new Uint8Array(manifest.frame.bytes);
-    /** @type {Record<string, any[]>} objects by kind and place */
+    /** @type {Record<string, any[]>} */
     this.made = {};
-    this.width = this.height = this.asked = 0;
-    /** @type {Record<string, number>} objects that are made, by kind */
+    /** @type {Record<string, number>} how many are made, by kind */
     this.counts = {};
+    this.width = this.height = 0;
     /** @type {Record<string, Record<string, any>>} contents other than the tables say, by kind and place */
     this.changed = {};
-    /** @type {any[]} */
-    this.passes = [];
   }
 
-  /** @param {any} manifest @param {GPUDevice} device @param {HTMLCanvasElement} canvas @param {import("./loading.js").Data} data */
-  static async open(manifest, device, canvas, data) {
-    const frame = new Frame(manifest, device, canvas);
-    await frame.show(0, data);
-    return frame;
-  }
-
-  /** Show a state of the room, once what it needs has arrived. @param {number} number @param {import("./loading.js").Data} data */
-  async show(number, data) {
-    const { counts, changes, passes } = this.manifest.states[number];
-    const wanted = ++this.asked;
+  /**
+   * Make the objects that a state counts, and write the contents in which it differs; false if another is wanted meanwhile.
+   * @param {Record<string, number>} counts @param {Record<string, Record<string, any>>} changes @param {Data} data
+   * @param {() => boolean} isWanted
+   */
+  async show(counts, changes, data, isWanted) {
     await this.load(counts, data);
     /** @type {[string, number, any][]} kind, place and data of what differs from what is shown */
     const differ = [];
@@ -94,13 +55,13 @@ export class Frame {
       for (const [at, piece] of Object.entries(places)) differ.push([kind, Number(at), piece]);
     }
     const contents = await Promise.all(differ.map(([, , piece]) => data.read(piece)));
-    if (wanted !== this.asked) return; // another state was asked for meanwhile
+    if (!isWanted()) return false;
     differ.forEach(([kind, at], i) => this.write(kind, at, contents[i]));
-    [this.changed, this.passes] = [changes, passes];
-    if (this.width) this.fit(this.width, this.height);
+    this.changed = changes;
+    return true;
   }
 
-  /** Make the objects of the tables up to these counts. @param {Record<string, number>} counts @param {import("./loading.js").Data} data */
+  /** Make the objects of the tables up to these counts. @param {Record<string, number>} counts @param {Data} data */
   async load(counts, data) {
     const { device, made } = this;
     /** @param {string} kind @returns {any[]} */
@@ -254,13 +215,6 @@ export class Frame {
     device.queue.submit([encoder.finish()]);
   }
 
-  /** Follow the size of the canvas. @param {number} width @param {number} height */
-  resize(width, height) {
-    if (width === this.width && height === this.height) return;
-    [this.canvas.width, this.canvas.height] = [width, height];
-    this.fit(width, height);
-  }
-
   /** Make the textures of a size, all views and all groups. @param {number} width @param {number} height */
   fit(width, height) {
     const { made, device, counts } = this,
@@ -292,65 +246,5 @@ export class Frame {
         })),
       }),
     );
-  }
-
-  /**
-   * Draw into the canvas, or into a texture of its size and format.
-   * @param {import("./camera.js").Camera} camera @param {number} exposureEv @param {GPUTexture} target
-   */
-  draw(camera, exposureEv, target = this.context.getCurrentTexture()) {
-    const { manifest, device, made } = this,
-      { offsets, buffer, nearM } = manifest.frame;
-    const fields = { ...frameOf(camera, this.width, this.height, nearM), exposure: [2 ** exposureEv * manifest.unit] };
-    const record = new DataView(this.bytes.buffer);
-    for (const [name, values] of Object.entries(fields)) {
-      values.forEach((value, i) => record.setFloat32(offsets[name] + 4 * i, value, true));
-    }
-    device.queue.writeBuffer(made.buffer[buffer], 0, this.bytes);
-    const encoder = device.createCommandEncoder(),
-      canvas = target.createView();
-    for (const one of this.passes) {
-      const depth = one.depthStencilAttachment;
-      const pass = encoder.beginRenderPass({
-        colorAttachments: one.colorAttachments.map((/** @type {any} */ a) => ({
-          ...a,
-          view: a.view === CANVAS ? canvas : made.view[a.view],
-        })),
-        ...(depth ? { depthStencilAttachment: { ...depth, view: made.view[depth.view] } } : {}),
-      });
-      for (const [name, first, second, third] of one.commands) {
-        if (name === "setPipeline") pass.setPipeline(made.render_pipeline[first]);
-        else if (name === "setBindGroup") pass.setBindGroup(first, made.bind_group[second]);
-        else if (name === "setVertexBuffer") pass.setVertexBuffer(first, made.buffer[second]);
-        else if (name === "setIndexBuffer") pass.setIndexBuffer(made.buffer[first], second);
-        else if (name === "drawIndexed") pass.drawIndexed(first, second, third);
-        else pass.draw(first);
-      }
-      pass.end();
-    }
-    device.queue.submit([encoder.finish()]);
-  }
-
-  /** The picture of a camera, (height, width, 4) bytes. @param {import("./camera.js").Camera} camera @param {number} exposureEv */
-  async pixels(camera, exposureEv) {
-    const { device, width, height } = this,
-      row = Math.ceil((4 * width) / 256) * 256;
-    const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC;
-    const target = device.createTexture({ size: [width, height], format: "rgba8unorm", usage });
-    const buffer = device.createBuffer({
-      size: row * height,
-      usage: GPUBufferUsage.COPY_DST | GPUBufferUsage.MAP_READ,
-    });
-    this.draw(camera, exposureEv, target);
-    const encoder = device.createCommandEncoder();
-    encoder.copyTextureToBuffer({ texture: target }, { buffer, bytesPerRow: row }, [width, height]);
-    device.queue.submit([encoder.finish()]);
-    await buffer.mapAsync(GPUMapMode.READ);
-    const padded = new Uint8Array(buffer.getMappedRange()),
-      packed = new Uint8ClampedArray(4 * width * height);
-    for (let y = 0; y < height; y++) packed.set(padded.subarray(y * row, y * row + 4 * width), 4 * width * y);
-    buffer.destroy();
-    target.destroy();
-    return packed;
   }
 }

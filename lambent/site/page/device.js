@@ -1,0 +1,29 @@
+// The graphics device of a browser.
+
+import { SiteError } from "./loading.js";
+
+/** What a browser lacks, in a line; null if nothing. @param {any} manifest @param {GPUAdapter} adapter */
+function lacking(manifest, adapter) {
+  const blocks = manifest.tables.texture.some((/** @type {any} */ one) => one.format.startsWith("bc"));
+  return blocks && !adapter.features.has("texture-compression-bc") ? "compressed textures (BC)" : null;
+}
+
+/** @param {any} manifest @returns {Promise<GPUDevice>} */
+export async function openDevice(manifest) {
+  const adapter = await navigator.gpu?.requestAdapter({ powerPreference: "high-performance" });
+  if (!adapter)
+    throw new SiteError("This browser has no WebGPU: Chrome, Edge or Safari of 2025 or later show the room.");
+  const lack = lacking(manifest, adapter);
+  if (lack) throw new SiteError(`This graphics adapter has no ${lack}.`);
+  /** @type {GPUFeatureName[]} */
+  const wanted = ["texture-compression-bc", "float32-filterable"];
+  const most = Math.max(...manifest.tables.buffer.map((/** @type {any} */ one) => one.size), 1 << 27);
+  return adapter.requestDevice({
+    requiredFeatures: wanted.filter((one) => adapter.features.has(one)),
+    requiredLimits: {
+      maxBufferSize: Math.min(Math.max(most, 256 << 20), adapter.limits.maxBufferSize),
+      maxStorageBufferBindingSize: Math.min(most, adapter.limits.maxStorageBufferBindingSize),
+      maxTextureDimension2D: adapter.limits.maxTextureDimension2D,
+    },
+  });
+}
