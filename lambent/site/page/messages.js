@@ -1,0 +1,29 @@
+// What the page says: while it loads, when something goes wrong, and what has changed.
+
+import { SiteError } from "./loading.js";
+
+const message = /** @type {HTMLElement} */ (document.getElementById("message"));
+const said = /** @type {HTMLElement} */ (document.getElementById("said"));
+/** @type {any} */
+let fault = null;
+
+/** Say over the picture how far the page is; a fault stays. @param {string} text */
+export function tell(text) {
+  if (!fault) message.textContent = text;
+}
+
+/** Say what has changed; it fades, but for what `stays`. @param {string} text */
+export function say(text, stays = false) {
+  const line = document.createElement("span");
+  line.textContent = text;
+  line.className = stays ? "stays" : "";
+  said.replaceChildren(line); // a new element: read aloud and faded anew
+}
+
+/** @param {any} error */
+export function failed(error) {
+  fault = error;
+  message.textContent =
+    error instanceof SiteError ? error.message : `The room cannot be shown: ${error.message ?? error}`;
+  if (!(error instanceof SiteError)) throw error;
+}
