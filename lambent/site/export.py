@@ -38,7 +38,6 @@ from lambent.store.store import Store
 
 Note = Callable[[str], None]
 FORMAT, VERSION, UNFINISHED = "lambent-site", 1, 0
-HEAD = b'{"format":"lambent-site"'  # of a manifest
 SIZE = 640, 360  # of the frame that is described; the page's follows its canvas
 POSTER = 1280, 720  # a picture for browsers without WebGPU, and while the room loads
 DISPLAY, BAKED = "site", "as baked"
@@ -58,12 +57,11 @@ def export(store: Store, folder: Path, progress: Progress = silent, note: Note =
     UserError
         If the folder holds something else, the scene has no camera, or there is no graphics adapter.
     """
-    _check(folder)
+    check_folder(folder, FORMAT, "a site")
     baked = read_baked(store)
     if not baked.record.cameras:
         raise UserError("has no camera", file=store.folder, hint="add [[cameras]] to its scene.toml")
-    folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / "manifest.json", json.dumps({"format": FORMAT, "version": UNFINISHED}, separators=(",", ":")))
+    mark(folder, FORMAT)
     for part in ("data", "shaders"):
         shutil.rmtree(folder / part, ignore_errors=True)
     device = DescribedDevice(open_device(device_needs(baked)))
@@ -97,15 +95,23 @@ def export(store: Store, folder: Path, progress: Progress = silent, note: Note =
     }  # fmt: skip
 
 
-def _check(folder: Path) -> None:
+def check_folder(folder: Path, form: str, what: str) -> None:
+    """Raise `UserError` if the folder holds anything but an export of this format."""
     if not folder.exists():
         return
     if not folder.is_dir():
         raise UserError("is no folder", file=folder, expected="a folder for the site")
     if any(folder.iterdir()):
         manifest = folder / "manifest.json"
-        if not manifest.is_file() or not read_head(manifest, len(HEAD)).startswith(HEAD):
-            raise UserError("holds other files than a site", file=folder, hint="choose a new folder")
+        head = f'{{"format":"{form}"'.encode()
+        if not manifest.is_file() or not read_head(manifest, len(head)).startswith(head):
+            raise UserError(f"holds other files than {what}", file=folder, hint="choose a new folder")
+
+
+def mark(folder: Path, form: str, version: int = UNFINISHED) -> None:
+    """Say in the folder what it holds, and that this is unfinished, unless a version is given."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / "manifest.json", json.dumps({"format": form, "version": version}, separators=(",", ":")))
 
 
 def _states(
@@ -119,13 +125,19 @@ def _states(
         light = MixTrack.of(variant.light).factors_at(0.0)
         return replace(state, light=light, materials=applied.materials, maps=renderer.light_version)
 
-    yield BAKED, lambda: shown(Variant(""))
+    for variant in states_of(store, note):
+        yield variant.name or BAKED, partial(shown, variant)
+
+
+def states_of(store: Store, note: Note) -> Iterator[Variant]:
+    """The room as baked, which has no name, and the variants whose light the store has."""
+    yield Variant("")
     groups = {group.name for group in light_groups(store)}
     for variant in variants_of(store):
         if missing := sorted(set(variant.light.groups) - groups):
             note(f"{variant.name} is left out: the store has no light group {', '.join(missing)}")
         else:
-            yield variant.name, partial(shown, variant)
+            yield variant
 
 
 def _write_poster(renderer: Renderer, state: FrameState, file: Path) -> None:

@@ -25,7 +25,7 @@ bake(scene, folder, *, quality, only, resume, seed, light_map, probes, light_gro
 check(subject, *, seed, reconstruction, progress, **values)
 compare(reference, test)
 convert(subject, file, *, as_, reconstruction, progress)
-export(store, folder, *, note, progress)
+export(store, folder, *, as_, size, views, note, progress)
 glare(what, camera, *, threshold_cd_m2, note, progress, **settings)
 open(folder)
 propose(scene, *, views, session, interreflection, store, progress)

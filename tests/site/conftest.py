@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+import threading
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -12,9 +14,19 @@ import pytest
 import lambent
 from lambent.materials.document import Lobe, Material
 from lambent.site import export
+from lambent.site.serving import SiteServer
 from lambent.store.kept.session import FILE, RoomState, WalkSession, write_session
 
 PAGE = Path(export.__file__).parent / "page"
+STILLS_PAGE = PAGE.with_name("stills_page")
+FLAGS = (
+    "--no-sandbox",
+    "--enable-unsafe-webgpu",
+    "--enable-features=Vulkan",
+    "--use-vulkan=swiftshader",
+    "--use-angle=swiftshader",
+)
+VIEWPORT = {"width": 320, "height": 240}
 
 
 @pytest.fixture
@@ -51,3 +63,37 @@ def box_site(adapter, blue_box, tmp_path_factory):
     folder = tmp_path_factory.mktemp("site") / "box"
     lambent.export(blue_box, folder)
     return folder
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    """Opens pages in Chromium with WebGPU on its software adapter."""
+    api = pytest.importorskip("playwright.sync_api", reason="there is no playwright to drive a browser")
+    program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if program is None:
+        pytest.skip("there is no Chromium to open the site in")
+    with api.sync_playwright() as driver:
+
+        @contextmanager
+        def opened(flags=FLAGS, **options):
+            browser = driver.chromium.launch(executable_path=program, args=list(flags))
+            try:
+                page = browser.new_page(viewport=VIEWPORT, **options)
+                page.set_default_timeout(180_000)
+                yield page
+            finally:
+                browser.close()
+
+        yield opened
+
+
+@contextmanager
+def served(folder):
+    with SiteServer(folder) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        try:
+            yield server.address
+        finally:
+            server.shutdown()
+            thread.join()

@@ -5,8 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import shutil
-import threading
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -16,20 +14,12 @@ from lambent.core.views.camera import Camera
 from lambent.realtime.frame_state import FrameState
 from lambent.realtime.renderer import Renderer
 from lambent.render.applied_materials import AppliedMaterials
-from lambent.site.serving import SiteServer
 from lambent.store.kept.states import variants_of
 from lambent.store.store import Store
+from tests.site.conftest import served
 from tests.site.test_page_modules import said
 
-FLAGS = (
-    "--no-sandbox",
-    "--enable-unsafe-webgpu",
-    "--enable-features=Vulkan",
-    "--use-vulkan=swiftshader",
-    "--use-angle=swiftshader",
-)
 SIZE = 96, 64
-VIEWPORT = {"width": 320, "height": 240}
 EYES = ((0, 1, 3.4), (0.3, 0.4, 0.2), (-0.6, 1.2, 0.5), (0.5, 1.5, -0.4), (0, 0.3, 0.8), (0.7, 0.2, -0.7))
 PIXELS = """async ([cameras, width, height]) => {
   const { readManifest, Data } = await import("/loading.js");
@@ -49,40 +39,6 @@ PIXELS = """async ([cameras, width, height]) => {
   }
   return { faults, found, exposureEv: manifest.exposureEv };
 }"""
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    """Opens pages in Chromium with WebGPU on its software adapter."""
-    api = pytest.importorskip("playwright.sync_api", reason="there is no playwright to drive a browser")
-    program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if program is None:
-        pytest.skip("there is no Chromium to open the site in")
-    with api.sync_playwright() as driver:
-
-        @contextmanager
-        def opened(flags=FLAGS, **options):
-            browser = driver.chromium.launch(executable_path=program, args=list(flags))
-            try:
-                page = browser.new_page(viewport=VIEWPORT, **options)
-                page.set_default_timeout(180_000)
-                yield page
-            finally:
-                browser.close()
-
-        yield opened
-
-
-@contextmanager
-def served(folder):
-    with SiteServer(folder) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        try:
-            yield server.address
-        finally:
-            server.shutdown()
-            thread.join()
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from lambent.core.views.camera import Camera
 from lambent.realtime.frame_state import FrameState, frame_data
 from lambent.site.chunks import Packing
 from lambent.viewer.cameras import cameras
-from tests.site.conftest import PAGE
+from tests.site.conftest import PAGE, STILLS_PAGE
 
 ROOT = Path(__file__).parents[2]
 
@@ -113,7 +113,9 @@ def test_types_fit(node_packages, tmp_path):
         "moduleResolution": "bundler", "lib": ["ES2023", "DOM", "DOM.Iterable"], "types": ["@webgpu/types"],
         "typeRoots": [str(node_packages)],
     }  # fmt: skip
-    (tmp_path / "tsconfig.json").write_text(json.dumps({"compilerOptions": options, "include": [f"{PAGE}/*.js"]}))
+    (tmp_path / "tsconfig.json").write_text(
+        json.dumps({"compilerOptions": options, "include": [f"{PAGE}/*.js", f"{STILLS_PAGE}/*.js"]})
+    )
     command = ["node", node_packages / "typescript/bin/tsc", "-p", tmp_path]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout
@@ -121,7 +123,7 @@ def test_types_fit(node_packages, tmp_path):
 
 @pytest.mark.slow
 def test_the_page_is_formatted(node_packages):
-    files = sorted(PAGE.glob("*.*"))
+    files = sorted([*PAGE.glob("*.*"), *STILLS_PAGE.glob("*.*")])
     command = ["node", node_packages / "prettier/bin/prettier.cjs", "--print-width", "120", "--check", *files]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -129,3 +131,4 @@ def test_the_page_is_formatted(node_packages):
 
 def test_the_page_stays_small():
     assert sum(len(file.read_text("utf-8").splitlines()) for file in PAGE.glob("*.js")) <= 2500
+    assert len((STILLS_PAGE / "stills.js").read_text("utf-8").splitlines()) <= 120
