@@ -320,6 +320,8 @@ class Scene:
     borders: Mapping[str, tuple[Border, ...]] = field(default_factory=dict)  # of parts, as in store.contract
     measured: Mapping[str, Path] = field(default_factory=dict)  # material -> the table that replaces it in bakes
     crease_deg: float | None = None  # angle for which hard edges and normals were recomputed
+    caption: str = ""  # a line about the scene, for those who look at it
+    credit: str = ""  # whose work it is
     origin: str | None = None  # "builtin:NAME" or the absolute path that it was loaded from; None if made in memory
 
     @property

@@ -31,6 +31,7 @@ from lambent.render.applied_materials import AppliedMaterials
 from lambent.render.output import ignore
 from lambent.scenes.scene import Variant
 from lambent.site.manifest import Manifest, camel
+from lambent.site.things import things
 from lambent.store.kept.states import lamps_of, variants_of
 from lambent.store.kept.views import read_views
 from lambent.store.light_groups import light_groups
@@ -74,17 +75,18 @@ def export(store: Store, folder: Path, progress: Progress = silent, note: Note =
         exposure_ev = metered(renderer.image(state)) or 0.0
     _write_poster(renderer, replace(state, exposure_ev=exposure_ev, planar="auto"), folder / "poster.jpg")
     shown = renderer.target(DISPLAY, SIZE).create_view()
-    manifest, states = Manifest(device, folder, SIZE, shown), []
-    for name, now in tracked(list(_states(store, renderer, state, note)), progress, "states"):
+    manifest, states, rooms = Manifest(device, folder, SIZE, shown), [], list(_states(store, renderer, state, note))
+    for room, now in tracked(rooms, progress, "states"):
         commands = Commands()
         renderer.frame(now(), commands, shown, whole=True)
-        states.append(manifest.state(name, commands))
+        states.append(manifest.state(room.name or BAKED, commands))
     document = {
         "format": FORMAT, "version": VERSION, "name": baked.record.name,
         "cameras": [camel(asdict(one)) for one in cameras],
         "bounds": np.asarray(baked.record.bounds).tolist(), "exposureEv": exposure_ev, "unit": baked.unit,
         "viewTransform": VIEW_TRANSFORMS[state.view_transform],
         "frame": _frame(manifest.refer(renderer.frame_buffer), state, baked.record.bounds),
+        "visit": things(store.folder, baked.record, renderer.resources, manifest, [room for room, _ in rooms]),
         "tables": manifest.tables, "states": states,
     }  # fmt: skip
     write_text(folder / "manifest.json", json.dumps(document, separators=(",", ":"), allow_nan=False))
@@ -116,8 +118,8 @@ def mark(folder: Path, form: str, version: int = UNFINISHED) -> None:
 
 def _states(
     store: Store, renderer: Renderer, state: FrameState, note: Note
-) -> Iterator[tuple[str, Callable[[], FrameState]]]:
-    """Names of the room's states, and what shows each and returns the state of its frame."""
+) -> Iterator[tuple[Variant, Callable[[], FrameState]]]:
+    """The room's states, the first without a name, and what shows each and returns the state of its frame."""
     applied = AppliedMaterials(store, renderer, note)
 
     def shown(variant: Variant) -> FrameState:
@@ -126,7 +128,7 @@ def _states(
         return replace(state, light=light, materials=applied.materials, maps=renderer.light_version)
 
     for variant in states_of(store, note):
-        yield variant.name or BAKED, partial(shown, variant)
+        yield variant, partial(shown, variant)
 
 
 def states_of(store: Store, note: Note) -> Iterator[Variant]:

@@ -260,6 +260,8 @@ class SceneRecord(Strict):
     warnings: tuple[str, ...] = ()
     textures: dict[str, TexturesRecord] = Field(default_factory=dict)  # by the material's name
     variants: tuple[Variant, ...] = Field(default=(), exclude_if=lambda variants: not variants)
+    caption: str = Field(default="", exclude_if=lambda text: not text)
+    credit: str = Field(default="", exclude_if=lambda text: not text)
 
 
 class ViewRecord(Strict):

@@ -98,7 +98,7 @@ def test_a_visit(chromium, box_site):
         page.wait_for_selector("body[data-state='blue']", state="attached")
         assert page.get_attribute("#states button >> text=blue", "aria-pressed") == "true"
         page.click("#share")
-        assert page.url == f"{address}#{first}"
+        assert page.url == f"{address}#{first}&state=blue"
         frames = int(page.get_attribute("body", "data-frames"))
         page.set_viewport_size({"width": 200, "height": 300})
         page.wait_for_selector(f"body:not([data-frames='{frames}'])", state="attached")

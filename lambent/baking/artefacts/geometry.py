@@ -78,7 +78,7 @@ def scene_record_of(scene: Scene, reflectors: tuple[ReflectorRecord, ...]) -> Sc
         name=scene.name, objects=object_records(scene), materials=dict(scene.materials), cameras=scene.cameras,
         paths=scene.paths, reflectors=reflectors, exposure_ev=scene.exposure_ev,
         bounds=(triple(low), triple(high)), warnings=scene.warnings, textures=texture_records(scene.textures),
-        variants=scene.variants,
+        variants=scene.variants, caption=scene.caption, credit=scene.credit,
     )  # fmt: skip
 
 

@@ -59,6 +59,7 @@ class Contents:
     environment: Environment | None = None
     tells_its_light: bool = False
     variants: Mapping[str, Mapping[str, tuple[str, Triple]]] = field(default_factory=dict)
+    credit: str = ""
 
     def scene(self, name: str) -> Scene:
         """A scene of this file alone, with daylight and a camera if it lacks them."""
@@ -76,6 +77,7 @@ class Contents:
             sources=self.sources,
             warnings=(*self.warnings, *notes, *emission_warnings(self.objects, sets)),
             textures=self.textures,
+            credit=self.credit,
         )
         looks = looks_as_loaded(scene.materials, scene.textures)
         return with_variants(scene, [

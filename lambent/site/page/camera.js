@@ -6,11 +6,14 @@
 
 export const TURN_RAD_PX = (0.3 * Math.PI) / 180;
 const PITCH_LIMIT_RAD = (85 * Math.PI) / 180;
-const WALK_M_S = 1.4,
-  EYE_HEIGHT_M = 1.6,
-  WALL_M = 0.15,
+export const PACE_M_S = 1.4,
+  WALL_M = 0.15, // the eye keeps this distance from walls
+  NEAREST_M = 0.02;
+const EYE_HEIGHT_M = 1.6,
   SETTLE_S = 0.12,
-  LONGEST_STEP_S = 0.25;
+  LONGEST_STEP_S = 0.25,
+  ZOOM_PER_STEP = 0.88,
+  FARTHEST_SIZES = 20; // of the scene
 
 /** @type {Record<string, Vector>} right, up, forward by `KeyboardEvent.key` */
 export const KEYS = {
@@ -25,15 +28,15 @@ export const KEYS = {
 };
 
 /** @param {Vector} a @param {Vector} b @returns {Vector} */
-const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+export const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 /** @param {Vector} a @param {Vector} b @param {number} s @returns {Vector} a + s b */
-const along = (a, b, s) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
+export const along = (a, b, s) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
 /** @param {Vector} a @param {Vector} b */
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 /** @param {Vector} a @param {Vector} b @returns {Vector} */
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+export const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 /** @param {Vector} a @returns {Vector} */
-const unit = (a) => {
+export const unit = (a) => {
   const length = Math.hypot(...a);
   return length > 0 ? [a[0] / length, a[1] / length, a[2] / length] : a;
 };
@@ -83,16 +86,21 @@ export function yawPitch(camera) {
 }
 
 /** @param {number} yaw @param {number} pitch @returns {Vector} */
-function direction(yaw, pitch) {
+export function direction(yaw, pitch) {
   const p = Math.min(Math.max(pitch, -PITCH_LIMIT_RAD), PITCH_LIMIT_RAD);
   return [Math.cos(p) * Math.sin(yaw), Math.sin(p), -Math.cos(p) * Math.cos(yaw)];
 }
 
 /** @param {Camera} camera @param {Vector} position @param {Vector} ahead unit @returns {Camera} */
-function placed(camera, position, ahead) {
-  const distance = Math.max(Math.hypot(...minus(camera.target, camera.position)), 0.02);
-  return { ...camera, name: "free", position, target: along(position, ahead, distance), up: [0, 1, 0] };
+export function placed(camera, position, ahead) {
+  return moved(camera, position, along(position, ahead, distanceOf(camera)));
 }
+
+/** @param {Camera} camera @param {Vector} position @param {Vector} target @returns {Camera} */
+const moved = ({ fovYDeg }, position, target) => ({ name: "free", position, target, up: [0, 1, 0], fovYDeg });
+
+/** @param {Camera} camera m from its target */
+const distanceOf = (camera) => Math.max(Math.hypot(...minus(camera.target, camera.position)), NEAREST_M);
 
 /** Turn on the spot. @param {Camera} camera @param {number} dx px @param {number} dy px @returns {Camera} */
 export function look(camera, dx, dy) {
@@ -100,37 +108,103 @@ export function look(camera, dx, dy) {
   return placed(camera, camera.position, direction(yaw + TURN_RAD_PX * dx, pitch - TURN_RAD_PX * dy));
 }
 
-/**
- * Move on foot: at eye height above the lowest point of the scene, within its bounds.
- * @param {Camera} camera @param {Iterable<string>} keys held @param {number} dtS @param {Bounds} bounds
- * @param {number} fast factor @param {[number, number]} stick right, forward @returns {Camera}
- */
-export function walk(camera, keys, dtS, bounds, fast = 1, stick = [0, 0]) {
-  let [right, forward] = stick;
+/** To the right, up and ahead of a level camera. @param {number} yaw @param {number} pitch @returns {Vector[]} */
+function level(yaw, pitch) {
+  const ahead = direction(yaw, pitch);
+  /** @type {Vector} */
+  const right = [Math.cos(yaw), 0, Math.sin(yaw)];
+  return [right, cross(right, ahead), ahead];
+}
+
+/** Turn about a place, which stays where it is in the picture. @param {Camera} camera @param {number} dx px @param {number} dy px @param {Vector} pivot @returns {Camera} */
+export function orbit(camera, dx, dy, pivot = camera.target) {
+  const [yaw, pitch] = yawPitch(camera),
+    before = level(yaw, pitch),
+    after = level(yaw + TURN_RAD_PX * dx, pitch - TURN_RAD_PX * dy),
+    arm = minus(camera.position, pivot);
+  const eye = after.reduce((at, axis, i) => along(at, axis, dot(before[i], arm)), pivot);
+  return moved(camera, eye, isTarget(camera, pivot) ? pivot : along(eye, after[2], distanceOf(camera)));
+}
+
+/** Move steps of the wheel towards a place, or away. @param {Camera} camera @param {number} steps @param {Bounds} bounds @param {Vector} pivot @returns {Camera} */
+export function zoom(camera, steps, bounds, pivot = camera.target) {
+  const before = Math.max(Math.hypot(...minus(pivot, camera.position)), NEAREST_M),
+    most = FARTHEST_SIZES * Math.hypot(...minus(bounds[1], bounds[0]));
+  return nearer(camera, pivot, Math.min(Math.max(before * ZOOM_PER_STEP ** steps, NEAREST_M), most) / before);
+}
+
+/** Move to this share of the distance from a place. @param {Camera} camera @param {Vector} pivot @param {number} share @returns {Camera} */
+export function nearer(camera, pivot, share) {
+  const eye = along(pivot, minus(camera.position, pivot), share),
+    ahead = direction(...yawPitch(camera));
+  const target = along(eye, ahead, Math.max(share * distanceOf(camera), NEAREST_M));
+  return moved(camera, eye, isTarget(camera, pivot) ? pivot : target);
+}
+
+/** @param {Camera} camera @param {Vector} place */
+const isTarget = (camera, place) => camera.target.every((x, i) => x === place[i]);
+
+/** Steps of the wheel that a pinch by this factor stands for. @param {number} factor */
+export const stepsOf = (factor) => -Math.log(factor) / Math.log(ZOOM_PER_STEP);
+
+/** The unit direction through a point of the picture, px from the top left. @param {Camera} camera @param {number} x @param {number} y @param {number} width @param {number} height @returns {Vector} */
+export function rayThrough(camera, x, y, width, height) {
+  const [right, up, forward] = axes(camera),
+    half = Math.tan((camera.fovYDeg * Math.PI) / 360);
+  const across = along(forward, right, (((2 * x) / width - 1) * half * width) / height);
+  return unit(along(across, up, (1 - (2 * y) / height) * half));
+}
+
+/** Metres in a second on foot. @param {Bounds} bounds */
+export const paceOf = (bounds) => (PACE_M_S * eyeHeightOf(bounds)) / EYE_HEIGHT_M;
+
+/** Height of the eye on foot, m. @param {Bounds} bounds */
+export function eyeHeightOf([low, high]) {
+  const heightM = high[1] - low[1];
+  return heightM >= EYE_HEIGHT_M + 2 * WALL_M ? EYE_HEIGHT_M : 0.6 * heightM;
+}
+
+/** @param {Vector} place @param {Bounds} bounds */
+export const isWithin = (place, [low, high]) => place.every((x, i) => x >= low[i] && x <= high[i]);
+
+/** Within the bounds, or no farther out than before. @param {Vector} eye @param {Vector} before @param {Bounds} bounds */
+export function confined(eye, before, [low, high]) {
+  const found = eye.map((value, i) => {
+    const margin = Math.min(WALL_M, 0.1 * (high[i] - low[i]));
+    const least = Math.min(low[i] + margin, before[i]),
+      most = Math.max(high[i] - margin, before[i]);
+    return Math.min(Math.max(value, least), most);
+  });
+  return /** @type {Vector} */ (found);
+}
+
+/** To the right and forward, by held keys and a stick. @param {Iterable<string>} keys @param {[number, number]} stick */
+export function pushOf(keys, [right, forward]) {
   for (const key of keys) {
     const way = KEYS[key];
     if (way) [right, forward] = [right + way[0], forward + way[2]];
   }
+  return [right, forward];
+}
+
+/**
+ * Move on foot: at eye height above the floor, within the scene's bounds.
+ * @param {Camera} camera @param {Iterable<string>} keys held @param {number} dtS @param {Bounds} bounds
+ * @param {number} fast factor @param {[number, number]} stick right, forward
+ * @param {number} floorY by default the lowest point of the scene @returns {Camera}
+ */
+export function walk(camera, keys, dtS, bounds, fast = 1, stick = [0, 0], floorY = bounds[0][1]) {
+  const [right, forward] = pushOf(keys, stick);
   const length = Math.hypot(right, forward);
   if (!length) return camera;
   dtS = Math.min(dtS, LONGEST_STEP_S);
-  const [low, high] = bounds,
-    heightM = high[1] - low[1];
-  const eyeHeightM = heightM >= EYE_HEIGHT_M + 2 * WALL_M ? EYE_HEIGHT_M : 0.6 * heightM;
+  const eyeHeightM = eyeHeightOf(bounds);
   const [yaw, pitch] = yawPitch(camera),
-    step = ((WALK_M_S * eyeHeightM) / EYE_HEIGHT_M) * fast * dtS;
+    step = paceOf(bounds) * fast * dtS;
   /** @type {Vector} */
   const across = [Math.cos(yaw), 0, Math.sin(yaw)];
   const share = step / Math.max(length, 1);
-  let eye = along(along(camera.position, across, share * right), direction(yaw, 0), share * forward);
-  eye[1] += (low[1] + eyeHeightM - eye[1]) * (1 - Math.exp(-dtS / SETTLE_S));
-  eye = /** @type {Vector} */ (
-    eye.map((value, i) => {
-      const margin = Math.min(WALL_M, 0.1 * (high[i] - low[i]));
-      const least = Math.min(low[i] + margin, camera.position[i]),
-        most = Math.max(high[i] - margin, camera.position[i]);
-      return Math.min(Math.max(value, least), most);
-    })
-  );
-  return placed(camera, eye, direction(yaw, pitch));
+  const eye = along(along(camera.position, across, share * right), direction(yaw, 0), share * forward);
+  eye[1] += (floorY + eyeHeightM - eye[1]) * (1 - Math.exp(-dtS / SETTLE_S));
+  return placed(camera, confined(eye, camera.position, bounds), direction(yaw, pitch));
 }

@@ -1,41 +1,64 @@
-// The visitor: where they stand, what they hold, and the frame that shows it.
+// The visitor: where they stand, what they see there, and the frame that shows it.
 
-import { KEYS, look, walk } from "./camera.js";
+import { addressOf, cameraAddress, readAddress } from "./address.js";
+import * as c from "./camera.js";
+import { glide, isFloor, standingAt, turned } from "./moves.js";
 
-/** @typedef {import("./camera.js").Camera} Camera */
+/** @typedef {c.Camera} Camera */
+/** @typedef {c.Vector} Vector */
 /** @typedef {import("./frame.js").Frame} Frame */
 /** @typedef {import("./loading.js").Data} Data */
+/** @typedef {import("./picking.js").Geometry} Geometry */
+/** @typedef {import("./picking.js").Hit & {thing: import("./picking.js").Thing, place: Vector, onFloor: boolean}} Found */
 
-const FAST = 3,
-  DRAG_PX_S = 400, // of two fingers, for a second of walking
-  DIGITS = 4;
+export const FAST = 3; // times the pace
+const LARGE = 0.5, // radius / distance of things that orbit turns about the clicked point of, not about their middle
+  PAD_PX_S = 400, // of a drag that turns as a whole deflection does
+  PAD_NOTCHES_S = 6; // of a wheel
 
-/** The camera in the address of the page, or else the first. @param {Camera[]} cameras @returns {Camera} */
-export function cameraOf(cameras) {
-  const numbers = location.hash.slice(1).split(",").map(Number);
-  if (numbers.length !== 7 || !numbers.every(Number.isFinite)) return cameras[0];
-  const [x, y, z, tx, ty, tz, fovYDeg] = numbers;
-  if (fovYDeg < 1 || fovYDeg > 170) return cameras[0];
-  return { name: "free", position: [x, y, z], target: [tx, ty, tz], up: [0, 1, 0], fovYDeg };
-}
-
-export class Visit {
-  /** @param {any} manifest @param {HTMLCanvasElement} canvas @param {Frame} frame @param {Data} data */
-  constructor(manifest, canvas, frame, data) {
+/** Fires `change` when what panel and card show has changed, `shown` after each frame, `light` when an address brings one. */
+export class Visit extends EventTarget {
+  /** @param {any} manifest @param {HTMLCanvasElement} canvas */
+  constructor(manifest, canvas) {
+    super();
     this.manifest = manifest;
     this.canvas = canvas;
-    this.frame = frame;
-    this.data = data;
-    this.camera = cameraOf(manifest.cameras);
-    this.state = 0;
-    /** @type {Set<string>} */
+    /** @type {Frame | null} */
+    this.frame = null;
+    /** @type {Data | null} */
+    this.data = null;
+    const { camera, state, exposureEv, viewTransform, light } = readAddress(location.hash, manifest);
+    this.camera = camera;
+    this.state = state;
+    this.exposureEv = exposureEv;
+    this.viewTransform = viewTransform;
+    this.light = light;
+    /** @type {Found | null} */
+    this.found = null;
+    /** @type {Vector | null} the centre of orbit; null on foot */
+    this.pivot = null;
+    /** @type {import("./moves.js").Motion | null} */
+    this.motion = null;
+    /** @type {Set<string>} keys */
     this.held = new Set();
-    /** @type {Map<number, {x: number, y: number}>} */
-    this.pointers = new Map();
     this.fast = 1;
+    /** @type {Geometry | null} */
+    this.geometry = null;
     this.lastMs = 0;
     this.requested = false;
     this.frames = 0;
+  }
+
+  /** Show the room by a frame and its data. @param {Frame} frame @param {Data} data @param {Geometry} geometry */
+  async take(frame, data, geometry) {
+    if (this.state) await frame.show(this.state, data);
+    Object.assign(this, { frame, data, geometry });
+    this.changed();
+  }
+
+  changed() {
+    this.dispatchEvent(new Event("change"));
+    this.touch();
   }
 
   /** Ask for a frame. */
@@ -47,24 +70,64 @@ export class Visit {
   /** @param {number} ms */
   show(ms) {
     this.requested = false;
-    const ratio = window.devicePixelRatio || 1,
-      { canvas } = this;
+    const { canvas, frame } = this,
+      ratio = window.devicePixelRatio || 1;
+    if (!frame) return;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((n) => Math.max(1, Math.round(n * ratio)));
-    this.frame.resize(width, height);
-    if (this.held.size) {
-      this.camera = walk(this.camera, this.held, (ms - this.lastMs) / 1e3, this.manifest.bounds, this.fast);
-      this.touch();
-    }
+    frame.resize(width, height);
+    this.advance(Math.max(0, ms - this.lastMs) / 1e3);
     this.lastMs = ms;
-    this.frame.draw(this.camera);
+    Object.assign(frame, { exposureEv: this.exposureEv, viewTransform: this.viewTransform });
+    frame.draw(this.camera);
     document.body.dataset.frames = String(++this.frames);
-    document.body.dataset.camera = this.address();
+    document.body.dataset.camera = cameraAddress(this.camera);
+    this.dispatchEvent(new Event("shown"));
   }
 
-  /** The camera as the page's address has it. */
-  address() {
-    const { position, target, fovYDeg } = this.camera;
-    return [...position, ...target, fovYDeg].map((x) => +x.toFixed(DIGITS)).join(",");
+  /** @param {number} dtS */
+  advance(dtS) {
+    const { motion } = this;
+    if (motion) {
+      motion.timeS += dtS;
+      this.camera = motion.at(motion.timeS);
+      if (motion.timeS < motion.seconds) this.touch();
+      else this.stop();
+    } else if (this.held.size) {
+      this.step([...this.held], dtS, this.fast);
+    }
+  }
+
+  /** Walk, or nearer and around in orbit. @param {string[]} keys @param {number} dtS @param {number} fast @param {[number, number]} stick */
+  step(keys, dtS, fast = 1, stick = [0, 0]) {
+    const { camera, pivot } = this,
+      { bounds } = this.manifest;
+    if (pivot) {
+      const [right, forward] = c.pushOf(keys, stick);
+      if (right) this.turn(-PAD_PX_S * dtS * right, 0);
+      if (forward) this.zoom(PAD_NOTCHES_S * dtS * forward);
+      return;
+    }
+    const floorY = this.geometry?.floorBelow(camera.position, c.eyeHeightOf(bounds));
+    this.go(c.walk(camera, keys, dtS, bounds, fast, stick, floorY));
+  }
+
+  /** Look around, or turn about the centre of orbit. @param {number} dx px @param {number} dy px */
+  turn(dx, dy) {
+    const { camera, pivot, geometry } = this;
+    this.go(pivot ? turned(camera, dx, dy, pivot, this.manifest.bounds, geometry) : c.look(camera, dx, dy));
+  }
+
+  /** @param {number} steps of the wheel */
+  zoom(steps) {
+    if (this.pivot) this.go(c.zoom(this.camera, steps, this.manifest.bounds, this.pivot));
+  }
+
+  /** Steer by a gamepad. @param {import("./gamepad.js").Pad} pad @param {number} dtS */
+  steer({ left, right, slower, faster }, dtS) {
+    const turn = PAD_PX_S * dtS * (this.pivot ? -1 : 1);
+    this.stop();
+    if (right[0] || right[1]) this.turn(turn * right[0], -turn * right[1]);
+    if (left[0] || left[1]) this.step([], dtS, FAST ** (faster - slower), this.pivot ? [0, left[1]] : left);
   }
 
   /** @param {Camera} camera */
@@ -73,54 +136,98 @@ export class Visit {
     this.touch();
   }
 
+  /** Go to a view, on foot. @param {Camera} camera */
+  view(camera) {
+    this.motion = this.pivot = null;
+    this.camera = camera;
+    this.changed();
+  }
+
+  /** @param {import("./moves.js").Motion} motion */
+  play(motion) {
+    this.motion = motion;
+    this.pivot = null;
+    this.lastMs = performance.now();
+    this.changed();
+  }
+
+  stop() {
+    if (!this.motion) return;
+    this.motion = null;
+    this.changed();
+  }
+
+  /** The thing at a point of the picture. @param {number} x px of the canvas @param {number} y @returns {Found | null} */
+  under(x, y) {
+    const { camera, canvas, geometry } = this;
+    const towards = c.rayThrough(camera, x, y, canvas.clientWidth, canvas.clientHeight),
+      hit = geometry?.hit(camera.position, towards);
+    if (!geometry || !hit?.thing) return null;
+    const place = c.along(camera.position, towards, hit.m);
+    return {
+      ...hit,
+      thing: hit.thing,
+      place,
+      onFloor: isFloor(camera, place, hit.face, geometry, this.manifest.bounds),
+    };
+  }
+
+  /** @param {Found | null} found */
+  select(found) {
+    this.found = found;
+    this.changed();
+  }
+
+  /** Walk to what was found. @param {Found} found */
+  goTo({ place, onFloor }) {
+    const { camera, geometry } = this,
+      { bounds } = this.manifest;
+    if (!geometry) return;
+    const end = standingAt(camera, place, onFloor, geometry, bounds);
+    if (matchMedia("(prefers-reduced-motion: reduce)").matches) return this.view(end);
+    this.play(glide(camera, end, FAST * c.paceOf(bounds)));
+  }
+
+  /** Orbit what was found or, without it, what the camera looks at; or walk again. */
+  toggleOrbit() {
+    const { found, camera } = this;
+    this.motion = null;
+    if (this.pivot || !found) this.pivot = this.pivot ? null : camera.target;
+    else {
+      const [low, high] = found.thing.bounds,
+        isLarge = Math.hypot(...c.minus(high, low)) / 2 > LARGE * found.m;
+      this.pivot = isLarge ? found.place : c.along(low, c.minus(high, low), 0.5);
+    }
+    this.changed();
+  }
+
   /** Show a state of the room, once what it needs has arrived. @param {number} number */
   async choose(number) {
     this.state = number;
-    await this.frame.show(number, this.data);
+    this.changed();
+    if (this.frame && this.data) await this.frame.show(number, this.data);
     document.body.dataset.state = this.manifest.states[number].name;
     this.touch();
   }
 
-  follow() {
-    const { canvas } = this;
-    canvas.addEventListener("pointerdown", (event) => {
-      canvas.setPointerCapture(event.pointerId);
-      this.pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
-    });
-    canvas.addEventListener("pointermove", (event) => this.drag(event));
-    for (const end of /** @type {const} */ (["pointerup", "pointercancel"])) {
-      canvas.addEventListener(end, (event) => this.pointers.delete(event.pointerId));
-    }
-    window.addEventListener("keydown", (event) => this.press(event));
-    window.addEventListener("keyup", (event) => this.held.delete(keyOf(event)));
-    window.addEventListener("blur", () => this.held.clear());
-    window.addEventListener("hashchange", () => this.go(cameraOf(this.manifest.cameras)));
-    new ResizeObserver(() => this.touch()).observe(canvas);
+  /** @param {{exposureEv?: number, viewTransform?: number}} look */
+  expose(look) {
+    Object.assign(this, look);
+    this.changed();
   }
 
-  /** One finger or the mouse looks, two fingers walk. @param {PointerEvent} event */
-  drag(event) {
-    const last = this.pointers.get(event.pointerId);
-    if (!last) return;
-    const [dx, dy] = [event.clientX - last.x, event.clientY - last.y];
-    this.pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
-    if (this.pointers.size === 1) return this.go(look(this.camera, dx, dy));
-    const far = Math.hypot(dx, dy);
-    if (far) this.go(walk(this.camera, [], far / DRAG_PX_S, this.manifest.bounds, FAST, [-dx / far, dy / far]));
+  /** What the page's address is to hold. */
+  address() {
+    return addressOf(this, this.manifest);
   }
 
-  /** @param {KeyboardEvent} event */
-  press(event) {
-    this.fast = event.shiftKey ? FAST : 1;
-    const key = keyOf(event);
-    if (!(key in KEYS) || event.ctrlKey || event.metaKey || event.altKey) return;
-    if (event.target instanceof Element && event.target.closest("input, select")) return; // they use the arrows
-    event.preventDefault();
-    if (!this.held.size) this.lastMs = performance.now();
-    this.held.add(key);
-    this.touch();
+  /** Show what the page's address holds. */
+  async restore() {
+    const { camera, state, light, ...look } = readAddress(location.hash, this.manifest);
+    this.light = light;
+    this.dispatchEvent(new Event("light"));
+    this.expose(look);
+    this.view(camera);
+    if (state !== this.state) await this.choose(state);
   }
 }
-
-/** @param {KeyboardEvent} event */
-const keyOf = (event) => (event.key.length === 1 ? event.key.toLowerCase() : event.key);

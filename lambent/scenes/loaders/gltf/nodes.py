@@ -101,6 +101,7 @@ class _Reading:
             (*self._unread(), *self._warnings, *self._renamings(), *made.notes, *images.notes, *self._gltf.files.notes),
             made.textures,
             variants=self._variants,
+            credit=self._gltf.document.copyright,
         )
 
     def _unread(self) -> Iterator[str]:

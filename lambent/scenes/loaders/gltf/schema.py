@@ -261,6 +261,7 @@ class GltfDocument(_Extended):
     """A whole glTF document."""
 
     version: str = _at("asset", "version")
+    copyright: str = _at("asset", "copyright", default="")
     scene: Index = 0
     scenes: list[SceneNodes] = []
     nodes: list[Node] = []

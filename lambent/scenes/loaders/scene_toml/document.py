@@ -118,6 +118,8 @@ def load_toml(path: Path, read_geometry: ReadGeometry, crease_deg: float | None 
         crease_deg=document.crease_angle,
         light_groups=_light_groups(document, objects, lights, path),
         grids=tuple(g.grid(objects, path, f"grids.{g.name}") for g in document.grids),
+        caption=document.caption,
+        credit=document.credit or "; ".join(dict.fromkeys(c.credit for c in contents if c.credit)),
     )
     of_geometry = {name: [o.material for o in changed] for name, changed in by_variant.items()}
     variants = parse_variants(document.variants, of_geometry, scene, LookFiles(path, files))

@@ -263,6 +263,8 @@ class SceneDocument(Section):
     format: Literal["lambent-scene"]
     version: Literal[1]
     name: str = "scene"
+    caption: str = ""
+    credit: str = ""
     geometry: Annotated[tuple[GeometrySection, ...], Field(min_length=1)]
     exposure_ev: Annotated[float, Field(ge=-30, le=30)] | None = None
     exposure_ev100: Annotated[float, Field(ge=-30, le=30)] | None = None

@@ -1,0 +1,83 @@
+// The card of a thing that was clicked: what it is made of, how that was measured, and in which finishes it comes.
+
+import { failed, say } from "./messages.js";
+
+/** @typedef {import("./visit.js").Visit} Visit */
+
+/** @param {string} id @returns {any} */
+const found = (id) => document.getElementById(id);
+
+/** Show what the visitor clicks. @param {Visit} visit */
+export function openCard(visit) {
+  visit.addEventListener("change", () => fill(visit));
+  found("go").onclick = () => visit.found && visit.goTo(visit.found);
+  found("orbit").onclick = () => visit.toggleOrbit();
+  found("close").onclick = () => {
+    visit.select(null);
+    visit.canvas.focus();
+  };
+}
+
+/** @param {Visit} visit */
+function fill(visit) {
+  const thing = visit.found?.thing;
+  found("card").hidden = !thing;
+  found("orbit").setAttribute("aria-pressed", String(visit.pivot !== null));
+  if (!thing) return;
+  const { finishes, finishesOfStates } = visit.manifest.visit,
+    now = finishesOfStates[visit.state][thing.material],
+    { name, facts } = finishes[now];
+  const lines = [["Finish", name], ...(facts.length ? facts : [["Measurement", "none on record"]])];
+  found("thing").textContent = thing.name;
+  found("facts").replaceChildren(...lines.flatMap(([what, text]) => [element("dt", what), element("dd", text)]));
+  offerFinishes(visit, thing.material, now);
+}
+
+/** @param {Visit} visit @param {string} material @param {number} now */
+function offerFinishes(visit, material, now) {
+  const offered = finishesOf(visit.manifest, material),
+    list = found("finishes"),
+    focused = list.contains(document.activeElement);
+  list.hidden = offered.length < 2;
+  const buttons = offered.map(({ finish, label }) => {
+    const button = element("button", label);
+    button.setAttribute("aria-pressed", String(finish === now));
+    button.addEventListener("click", () => {
+      visit
+        .choose(stateWith(visit.manifest, visit.state, material, finish))
+        .then(() => say(label))
+        .catch(failed);
+    });
+    return button;
+  });
+  list.replaceChildren(...buttons);
+  if (focused) buttons.find((one) => one.getAttribute("aria-pressed") === "true")?.focus();
+}
+
+/** The finishes of a material in all states; those of one name with the state that has them. @param {any} manifest @param {string} material @returns {{finish: number, label: string}[]} */
+export function finishesOf({ visit, states }, material) {
+  const ofStates = visit.finishesOfStates.map((/** @type {Record<string, number>} */ one) => one[material]);
+  const offered = [...new Set(ofStates)],
+    names = offered.map((finish) => visit.finishes[finish].name);
+  return offered.map((finish, i) => {
+    const isOnly = names.filter((name) => name === names[i]).length === 1;
+    return { finish, label: isOnly ? names[i] : `${names[i]} (${states[ofStates.indexOf(finish)].name})` };
+  });
+}
+
+/** The state with a finish that differs least from the present one. @param {any} manifest @param {number} now @param {string} material @param {number} finish */
+export function stateWith({ visit }, now, material, finish) {
+  /** @type {Record<string, number>[]} */
+  const all = visit.finishesOfStates;
+  const differences = all.map((one) =>
+    one[material] === finish ? Object.keys(one).filter((name) => one[name] !== all[now][name]).length : Infinity,
+  );
+  return differences.indexOf(Math.min(...differences));
+}
+
+/** @param {string} kind @param {string} text */
+function element(kind, text) {
+  const made = document.createElement(kind);
+  made.textContent = text;
+  return made;
+}

@@ -1,0 +1,46 @@
+// What a visitor takes away: a link to what they see, and its picture.
+
+import { say } from "./messages.js";
+
+/** @typedef {import("./visit.js").Visit} Visit */
+
+const LONGEST_BYTES = 240; // of a file's name without its ending; file systems take 255
+
+/** Put what is seen into the address, and copy that. @param {Visit} visit */
+export async function share(visit) {
+  const button = /** @type {HTMLElement} */ (document.getElementById("share"));
+  history.replaceState(null, "", `#${visit.address()}`);
+  try {
+    await navigator.clipboard.writeText(location.href);
+  } catch {
+    return say(location.href, true); // refused, or not on a secure address: to be copied by hand
+  }
+  const text = button.textContent;
+  button.textContent = "Link copied";
+  say("Link copied");
+  visit.addEventListener("shown", () => (button.textContent = text), { once: true });
+}
+
+/** Download the picture. @param {Visit} visit */
+export async function keep(visit) {
+  const { frame, camera, manifest } = visit;
+  if (!frame) return;
+  const { width, height } = frame,
+    pixels = await frame.pixels(camera);
+  const canvas = Object.assign(document.createElement("canvas"), { width, height });
+  canvas.getContext("2d")?.putImageData(new ImageData(pixels, width, height), 0, 0);
+  const blob = await new Promise((done) => canvas.toBlob(done, "image/png")),
+    link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = fileName([manifest.name, manifest.states[visit.state].name, camera.name]);
+  link.click();
+  URL.revokeObjectURL(link.href);
+  say(`${link.download} saved`);
+}
+
+/** A name for a file that all systems take. @param {string[]} parts */
+export function fileName(parts) {
+  let stem = [...parts.join(" - ").replace(/[\\/:*?"<>|\p{Cc}]/gu, "_")];
+  while (new TextEncoder().encode(stem.join("")).length > LONGEST_BYTES) stem = stem.slice(0, -1);
+  return `${stem.join("")}.png`;
+}
