@@ -29,7 +29,7 @@ BLENDER_PACKAGES = ["libsm6", "libgl1", "libxfixes3", "libxi6", "libxkbcommon0",
 # Of npm: the glTF validator, and what checks the JavaScript of sites; tests that need one skip where it is not.
 NODE_PACKAGES = ("gltf-validator@2.0.0-dev.3.10", "typescript@5.9.3", "@webgpu/types@0.1.74", "prettier@3.6.2")
 WINDOW_TEST_PACKAGES = {"Xvfb": "xvfb", "xdotool": "xdotool"}
-BROWSER = "chromium"  # of Debian; elsewhere the tests take one that is there, or skip
+BROWSERS = "chromium", "firefox-esr"  # of Debian; elsewhere the tests take those that are there, or skip
 
 
 class Stop(Exception):
@@ -97,7 +97,7 @@ def set_up(for_tests):
     if for_tests:
         install_node_packages()
         install_blender()
-        install_browser()
+        install_browsers()
     install_system_parts(for_tests)
     STAMP.write_text(json.dumps({"wanted": wanted, "tests": for_tests}), encoding="utf-8")
 
@@ -164,10 +164,11 @@ def install_blender():
         apt_install(BLENDER_PACKAGES)
 
 
-def install_browser():
-    """By itself: where the system has no such package, the others are installed all the same."""
-    if sys.platform.startswith("linux") and not shutil.which(BROWSER) and not apt_install([BROWSER]):
-        say(f"{BROWSER} could not be installed; the tests that open sites skip without a browser")
+def install_browsers():
+    """By themselves: where the system has no such package, the others are installed all the same."""
+    for browser in BROWSERS if sys.platform.startswith("linux") else ():
+        if not shutil.which(browser) and not apt_install([browser]):
+            say(f"{browser} could not be installed; the tests that open sites in it skip")
 
 
 def install_system_parts(for_tests):

@@ -88,8 +88,8 @@ def chromium():
 
 
 @contextmanager
-def served(folder):
-    with SiteServer(folder) as server:
+def served(folder, host="127.0.0.1"):
+    with SiteServer(folder, host) as server:
         thread = threading.Thread(target=server.serve_forever)
         thread.start()
         try:

@@ -137,11 +137,3 @@ def test_a_damaged_or_missing_file_is_said(chromium, box_site, tmp_path):
             page.goto(address)
             page.wait_for_selector(f"#message:has-text('{words}')")
             assert page.is_visible("#poster")
-
-
-@pytest.mark.slow
-def test_a_browser_without_webgpu_shows_a_picture(chromium, box_site):
-    with chromium(flags=("--no-sandbox", "--disable-features=WebGPU")) as page, served(box_site) as address:
-        page.goto(address)
-        page.wait_for_selector("#message:has-text('no WebGPU')")
-        assert page.is_visible("#poster") and not page.is_visible("#share")

@@ -8,11 +8,17 @@ function lacking(manifest, adapter) {
   return blocks && !adapter.features.has("texture-compression-bc") ? "compressed textures (BC)" : null;
 }
 
+/** Why there is no adapter, and what helps. */
+function missing() {
+  if (!isSecureContext) return "Browsers have WebGPU for pages from https or localhost only: serve this one by https.";
+  if (!navigator.gpu) return "This browser has no WebGPU: Chrome, Edge or Safari of 2025 or later show the room.";
+  return "WebGPU finds no graphics adapter: turn on hardware acceleration in the browser, or update the graphics driver.";
+}
+
 /** @param {any} manifest @returns {Promise<GPUDevice>} */
 export async function openDevice(manifest) {
   const adapter = await navigator.gpu?.requestAdapter({ powerPreference: "high-performance" });
-  if (!adapter)
-    throw new SiteError("This browser has no WebGPU: Chrome, Edge or Safari of 2025 or later show the room.");
+  if (!adapter) throw new SiteError(missing());
   const lack = lacking(manifest, adapter);
   if (lack) throw new SiteError(`This graphics adapter has no ${lack}.`);
   /** @type {GPUFeatureName[]} */
