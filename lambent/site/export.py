@@ -102,7 +102,7 @@ def check_folder(folder: Path, form: str, what: str) -> None:
     if not folder.exists():
         return
     if not folder.is_dir():
-        raise UserError("is no folder", file=folder, expected="a folder for the site")
+        raise UserError("is no folder", file=folder, expected="a folder to write")
     if any(folder.iterdir()):
         manifest = folder / "manifest.json"
         head = f'{{"format":"{form}"'.encode()
