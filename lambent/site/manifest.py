@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,8 @@ from lambent.realtime.gpu.described import DescribedDevice, Made
 from lambent.realtime.gpu.pipelines import VERTEX_FLOATS
 from lambent.realtime.gpu.read_back import BLOCKS, buffer_bytes, texel, texture_levels
 from lambent.site.chunks import TALLEST_PX, Chunks, Packing
+from lambent.site.standins import LARGE, standin
+from lambent.site.vertices import UNITS, words_of
 
 VERTEX, INDEX = 0x20, 0x10  # usages of buffers
 FACES = 6  # of a cube
@@ -51,7 +54,25 @@ class Manifest:
             if now["sha256"] != before["sha256"]:
                 changes[kind][at] = now
         counts = {kind: len(table) for kind, table in self.tables.items()}
-        return {"name": name, "counts": counts, "changes": changes, "passes": passes}
+        return {
+            "name": name, "counts": counts, "changes": changes, "passes": passes, "finer": self._finer(commands.passes),
+        }  # fmt: skip
+
+    def _finer(self, passes: Sequence[RenderPass]) -> list[int]:
+        """Places of textures with stand-ins, those that most draws read first, and small before large ones."""
+        draws, textures = Counter[int](), self.tables["texture"]
+        for one in passes:
+            groups: dict[int, Any] = {}
+            for name, given in one.commands:
+                if name == "set_bind_group":
+                    groups[given[0]] = self.tables["bind_group"][self.refer(given[1])]
+                elif name.startswith("draw"):
+                    views = {
+                        entry["view"] for group in groups.values() for entry in group["entries"] if "view" in entry
+                    }
+                    draws.update(self.tables["view"][view]["texture"] for view in views)
+        large = [at for at, one in enumerate(textures) if "standin" in one.get("data", {})]
+        return sorted(large, key=lambda at: (-draws[at], textures[at]["data"]["packed"]))
 
     def _passes(self, commands: Commands) -> list[dict[str, Any]]:
         views = [view for one in commands.passes for view in _attached(one)]
@@ -95,7 +116,19 @@ class Manifest:
             **camel(made.descriptor), "size": [CANVAS, CANVAS, *size[2:]] if follows else list(size),
             "format": made.one.format,
         }  # fmt: skip
-        return found if drawn else {**found, "data": self._content(made.one)}
+        return found if drawn else {**found, "data": self._with_standin(made.one)}
+
+    def _with_standin(self, texture: Any) -> dict[str, Any]:
+        """Where the content of a texture is, and what stands in for it until it has arrived, if it is large."""
+        content = self._content(texture)
+        if content["packed"] < LARGE:
+            return content
+        found = standin(texture.format, texture.size, texture_levels(self._device, texture))
+        if found is None:
+            return content
+        finest, levels = found
+        piece = self._packed_texels(texture.format, texture.size[2], levels)
+        return {**content, "standin": {**piece, "finest": finest}}
 
     def _content(self, one: Any) -> dict[str, Any]:
         """Where the present content of a buffer or texture is."""
@@ -103,6 +136,12 @@ class Manifest:
         if made.kind == "texture":
             return self._texels(one)
         data, usage = buffer_bytes(self._device, one), made.descriptor["usage"]
+        if (
+            usage & VERTEX
+            and (words := words_of(np.frombuffer(data, np.float32).reshape(-1, VERTEX_FLOATS))) is not None
+        ):
+            shorter = Packing(4, words.shape[1], [(words.size, 0)])
+            return {**self.chunks.add(words.tobytes(), shorter), "units": UNITS}
         channels = VERTEX_FLOATS if usage & VERTEX else 3 if usage & INDEX else 1
         packing = Packing(4, channels, [(len(data) // 4, 0)]) if len(data) % (4 * channels) == 0 else None
         return self.chunks.add(data, packing)
@@ -113,8 +152,10 @@ class Manifest:
             return self.chunks.add(b"".join(levels))
         if texture.format == COLOURS and (picture := _picture(texture, levels)):
             return self.chunks.add_picture(picture)
-        word, channels = texel(texture.format)
-        layers = texture.size[2]
+        return self._packed_texels(texture.format, texture.size[2], levels)
+
+    def _packed_texels(self, format: str, layers: int, levels: list[bytes]) -> dict[str, Any]:
+        word, channels = texel(format)
         runs = [(len(level) // word, len(level) // word // layers * FACES if layers > FACES else 0) for level in levels]
         return self.chunks.add(b"".join(levels), Packing(word, channels, runs))
 

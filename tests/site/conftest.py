@@ -13,7 +13,7 @@ import pytest
 
 import lambent
 from lambent.materials.document import Lobe, Material
-from lambent.site import export
+from lambent.site import export, manifest
 from lambent.site.serving import SiteServer
 from lambent.store.kept.session import FILE, RoomState, WalkSession, write_session
 
@@ -97,3 +97,13 @@ def served(folder, host="127.0.0.1"):
         finally:
             server.shutdown()
             thread.join()
+
+
+@pytest.fixture(scope="session")
+def streamed_site(adapter, blue_box, tmp_path_factory):
+    """The box with stand-ins, as larger rooms have them."""
+    folder = tmp_path_factory.mktemp("streamed") / "box"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(manifest, "LARGE", 1000)
+        lambent.export(blue_box, folder)
+    return folder

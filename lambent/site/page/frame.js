@@ -23,22 +23,26 @@ export class Frame {
     this.viewTransform = manifest.viewTransform;
     /** @type {any[]} */
     this.passes = [];
+    this.finer = () => {}; // called when a state can be drawn, and when finer content has arrived
   }
 
-  /** @param {any} manifest @param {GPUDevice} device @param {HTMLCanvasElement} canvas @param {import("./loading.js").Data} data */
-  static async open(manifest, device, canvas, data) {
+  /** @param {any} manifest @param {GPUDevice} device @param {HTMLCanvasElement} canvas @param {import("./loading.js").Data} data @param {number} number of the state @param {(frame: Frame) => void} finer */
+  static async open(manifest, device, canvas, data, number = 0, finer = () => {}) {
     const frame = new Frame(manifest, device, canvas);
-    await frame.show(0, data);
+    frame.finer = () => finer(frame);
+    await frame.show(number, data);
     return frame;
   }
 
-  /** Show a state of the room, once what it needs has arrived. @param {number} number @param {import("./loading.js").Data} data */
+  /** Show a state of the room: with stand-ins, once what it needs has arrived; then exactly. @param {number} number @param {import("./loading.js").Data} data */
   async show(number, data) {
-    const { counts, changes, passes } = this.manifest.states[number],
+    const { counts, changes, passes, finer } = this.manifest.states[number],
       wanted = ++this.asked;
     if (!(await this.objects.show(counts, changes, data, () => wanted === this.asked))) return;
     this.passes = passes;
     if (this.width) this.objects.fit(this.width, this.height);
+    this.finer();
+    await this.objects.refine(finer, data, this.finer);
   }
 
   /** Follow the size of the canvas. @param {number} width @param {number} height */

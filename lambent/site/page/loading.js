@@ -3,15 +3,18 @@
 /** A fault that a person can do something about. */
 export class SiteError extends Error {}
 
+/** A fault of a file: it may come if it is asked for again. */
+export class FileError extends SiteError {}
+
 /** @param {string} file relative to the page @returns {Promise<Response>} */
 async function fetched(file) {
   let answer;
   try {
     answer = await fetch(new URL(file, import.meta.url));
   } catch {
-    throw new SiteError(`${file} cannot be fetched; is the server still there?`);
+    throw new FileError(`${file} cannot be fetched; is the server still there?`);
   }
-  if (!answer.ok) throw new SiteError(`${file} cannot be fetched (${answer.status} ${answer.statusText})`);
+  if (!answer.ok) throw new FileError(`${file} cannot be fetched (${answer.status} ${answer.statusText})`);
   return answer;
 }
 
@@ -31,7 +34,9 @@ export async function readText(file) {
 }
 
 /** @typedef {{word: 1|2|4, channels: number, runs: [number, number][]}} Packing */
-/** @typedef {{file: string, bytes: number, packed: number, sha256: string, packing?: Packing, picture?: boolean}} Piece */
+/** @typedef {{file: string, bytes: number, packed: number, sha256: string, packing?: Packing, units?: number[], picture?: boolean}} Piece */
+
+const STEPS = 32767; // of an octahedron's square
 
 /** The data of differences: see lambent/site/chunks.py. @param {Uint8Array} bytes @param {Packing} packing @returns {ArrayBuffer} */
 export function unpack(bytes, { word, channels, runs }) {
@@ -60,54 +65,120 @@ export function unpack(bytes, { word, channels, runs }) {
   return found;
 }
 
-/** Reads files of data, each once, and reports the bytes that have arrived. */
+/**
+ * Vertices: their words, in which a unit vector is a point of an octahedron; see lambent/site/vertices.py.
+ * @param {ArrayBuffer} data @param {number} channels words of a vertex @param {number[]} units first floats of unit vectors
+ */
+export function vertices(data, channels, units) {
+  const floats = new Float32Array(data),
+    points = new Int32Array(data),
+    count = floats.length / channels;
+  const found = new Float32Array(count * (channels + units.length));
+  for (let vertex = 0, from = 0, to = 0; vertex < count; vertex++) {
+    const first = to;
+    for (const end of [...units, channels + units.length]) {
+      while (to < first + end) found[to++] = floats[from++];
+      if (end > channels) break;
+      let x = points[from++] / STEPS,
+        y = points[from++] / STEPS;
+      const z = 1 - Math.abs(x) - Math.abs(y);
+      if (z < 0) [x, y] = [(1 - Math.abs(y)) * (x >= 0 ? 1 : -1), (1 - Math.abs(x)) * (y >= 0 ? 1 : -1)];
+      const length = Math.sqrt(x * x + y * y + z * z);
+      for (const value of [x, y, z]) found[to++] = value / length;
+    }
+  }
+  return found.buffer;
+}
+
+/**
+ * All levels of a texture of its stand-in, whose first level is the `finest`: each texel by the one that covers it.
+ * @param {ArrayBuffer} standin @param {number[]} size @param {number} levels @param {number} finest @param {number} bytes a texel
+ */
+export function enlarged(standin, [width, height, layers = 1], levels, finest, bytes) {
+  const Words = bytes % 4 ? (bytes % 2 ? Uint8Array : Uint16Array) : Uint32Array,
+    words = bytes / Words.BYTES_PER_ELEMENT;
+  const sides = Array.from({ length: Math.max(levels, finest + 1) }, (_, level) =>
+    [width, height].map((side) => Math.max(1, side >> level)),
+  );
+  const texels = sides.slice(0, levels).reduce((sum, [w, h]) => sum + w * h * layers, 0);
+  const from = new Words(standin),
+    found = new Words(texels * words);
+  for (let level = 0, to = 0, first = 0; level < levels; level++) {
+    const source = Math.max(level, finest),
+      shift = source - level;
+    const [[w, h], [sw, sh]] = [sides[level], sides[source]];
+    for (let row = 0; row < h * layers; row++) {
+      const line = first + (Math.floor(row / h) * sh + Math.min(row % h >> shift, sh - 1)) * sw * words;
+      for (let x = 0; x < w; x++) {
+        const at = line + Math.min(x >> shift, sw - 1) * words;
+        for (let i = 0; i < words; i++) found[to++] = from[at + i];
+      }
+    }
+    if (level >= finest) first += sw * sh * layers * words;
+  }
+  return found.buffer;
+}
+
+/** Files whose content is needed again once it is on the GPU: what states change. @param {any} manifest @returns {Set<string>} */
+export function neededAgain({ tables, states }) {
+  const files = new Set();
+  for (const { changes } of states) {
+    for (const [kind, places] of Object.entries(changes)) {
+      for (const [at, piece] of Object.entries(places)) files.add(piece.file).add(tables[kind][at].data.file);
+    }
+  }
+  return files;
+}
+
+/** Reads files of data, and reports the bytes that have arrived. */
 export class Data {
-  /** @param {(done: number) => void} report */
-  constructor(report) {
+  /** @param {(done: number) => void} report @param {Set<string>} kept files of which the content is kept */
+  constructor(report, kept = new Set()) {
     this.report = report;
+    this.kept = kept;
     this.done = 0;
-    /** @type {Map<string, Promise<ArrayBuffer | ImageBitmap>>} */
+    /** @type {Map<string, Promise<ArrayBuffer | ImageBitmap>>} files on their way, and those that are kept */
     this.files = new Map();
   }
 
   /** @param {Piece} piece @returns {Promise<ArrayBuffer | ImageBitmap>} */
   read(piece) {
-    let found = this.files.get(piece.file);
-    if (!found) this.files.set(piece.file, (found = this.unpacked(piece)));
-    return found;
-  }
-
-  /** @param {Piece} piece @param {Response} answer @returns {Promise<ImageBitmap>} */
-  async picture(piece, answer) {
-    let found;
-    try {
-      found = await createImageBitmap(await answer.blob(), { premultiplyAlpha: "none", colorSpaceConversion: "none" });
-    } catch {
-      throw new SiteError(`${piece.file} is damaged; export the site again`);
+    const { file } = piece;
+    let found = this.files.get(file);
+    if (!found) {
+      this.files.set(file, (found = this.unpacked(piece)));
+      const forget = () => this.files.delete(file);
+      found.then(this.kept.has(file) ? undefined : forget, forget);
     }
-    this.report((this.done += piece.packed));
     return found;
   }
 
   /** @param {Piece} piece @returns {Promise<ArrayBuffer | ImageBitmap>} */
   async unpacked(piece) {
     const answer = await fetched(piece.file);
-    if (piece.picture) return this.picture(piece, answer);
-    const body = answer.body;
-    if (!body) throw new SiteError(`${piece.file} is empty`);
-    let data;
+    let packed;
     try {
-      data = await new Response(body.pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+      packed = await answer.blob();
     } catch {
-      throw new SiteError(`${piece.file} is damaged; export the site again`);
+      throw new FileError(`${piece.file} did not arrive whole; is the server still there?`);
     }
-    if (piece.packing) data = unpack(new Uint8Array(data), piece.packing);
-    const digest = globalThis.crypto?.subtle && new Uint8Array(await crypto.subtle.digest("SHA-256", data));
-    const hex = digest && Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
-    if (data.byteLength !== piece.bytes || (hex && hex !== piece.sha256)) {
-      throw new SiteError(`${piece.file} is damaged; export the site again`);
-    }
+    const content = await (piece.picture ? picture(packed) : bytesOf(piece, packed)).catch(() => null);
+    if (!content) throw new FileError(`${piece.file} is damaged; export the site again`);
     this.report((this.done += piece.packed));
-    return data;
+    return content;
   }
+}
+
+/** @param {Blob} packed @returns {Promise<ImageBitmap>} */
+const picture = (packed) => createImageBitmap(packed, { premultiplyAlpha: "none", colorSpaceConversion: "none" });
+
+/** The content of a file; null if it is not what the manifest says. @param {Piece} piece @param {Blob} packed */
+async function bytesOf(piece, packed) {
+  const { bytes, sha256, packing, units } = piece;
+  let data = await new Response(packed.stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+  if (packing) data = unpack(new Uint8Array(data), packing);
+  const digest = globalThis.crypto?.subtle && new Uint8Array(await crypto.subtle.digest("SHA-256", data));
+  const hex = digest && Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
+  if (data.byteLength !== bytes || (hex && hex !== sha256)) return null;
+  return packing && units ? vertices(data, packing.channels, units) : data;
 }

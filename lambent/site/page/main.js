@@ -5,8 +5,8 @@ import { openPanel } from "./controls.js";
 import { openDevice } from "./device.js";
 import { Frame } from "./frame.js";
 import { follow } from "./input.js";
-import { Data, readManifest } from "./loading.js";
-import { failed, tell } from "./messages.js";
+import { Data, neededAgain, readManifest } from "./loading.js";
+import { failed, forgive, tell, tellRest } from "./messages.js";
 import { readGeometry } from "./picking.js";
 import { Visit } from "./visit.js";
 
@@ -17,7 +17,9 @@ const MB = 1e6;
 function packedBytes(manifest) {
   const { counts } = manifest.states[0];
   const pieces = ["buffer", "texture"].flatMap((kind) =>
-    manifest.tables[kind].slice(0, counts[kind]).flatMap((/** @type {any} */ one) => one.data ?? []),
+    manifest.tables[kind]
+      .slice(0, counts[kind])
+      .flatMap((/** @type {any} */ { data }) => (data ? [data, data.standin ?? []].flat() : [])),
   );
   return [...new Map(pieces.map((piece) => [piece.file, piece.packed])).values()].reduce((a, b) => a + b, 0);
 }
@@ -30,31 +32,61 @@ function entitle({ name, visit: { caption } }) {
   document.getElementById("poster")?.setAttribute("alt", description);
 }
 
+/** Load the room: it is shown with stand-ins for large textures first, then with all that it consists of. */
 async function open() {
+  shown = undefined;
   const manifest = await readManifest(),
     all = packedBytes(manifest);
   entitle(manifest);
-  const device = await openDevice(manifest);
+  const device = await openDevice(manifest),
+    here = visit ?? new Visit(manifest, canvas);
   const data = new Data((done) => {
     const of = done > all ? "" : ` of ${(all / MB).toFixed(1)}`;
-    tell(`Loading ${(done / MB).toFixed(1)}${of} MB…`);
-  });
-  const frame = await Frame.open(manifest, device, canvas, data);
+    (shown ? tellRest : tell)(`Loading ${(done / MB).toFixed(1)}${of} MB…`);
+  }, neededAgain(manifest));
   device.lost.then((info) => {
     if (info.reason === "destroyed") return;
     tell("The graphics device was lost; loading the room again…");
-    open().catch(failed);
+    attempt(open);
   });
-  const geometry = await readGeometry(manifest, data);
-  tell("");
-  if (visit) return visit.take(frame, data, geometry);
-  visit = new Visit(manifest, canvas);
-  openPanel(visit);
-  openCard(visit);
-  await visit.take(frame, data, geometry);
-  follow(visit);
+  await Promise.all([
+    readGeometry(manifest, data).then((geometry) => (here.geometry = geometry)),
+    Frame.open(manifest, device, canvas, data, here.state, (frame) => {
+      if (frame === shown) return here.touch();
+      shown = frame;
+      tell("");
+      here.take(frame, data);
+      if (!visit) begin(here);
+    }),
+  ]);
+  tellRest("");
 }
+
+/** @param {Visit} here */
+function begin(here) {
+  visit = here;
+  openPanel(here);
+  openCard(here);
+  follow(here);
+  here.changed();
+}
+
+/** Once more: what has not arrived, or everything where there is no picture yet. */
+async function again() {
+  if (!shown || !visit?.data) return open();
+  await shown.show(visit.state, visit.data);
+  tellRest("");
+}
+
+/** @param {() => Promise<void>} act */
+const attempt = (act) => act().catch(failed);
 
 /** @type {Visit | undefined} */
 let visit;
-open().catch(failed);
+/** @type {Frame | undefined} that shows the room on the present device */
+let shown;
+document.getElementById("again")?.addEventListener("click", () => {
+  forgive();
+  attempt(again);
+});
+attempt(open);

@@ -1,8 +1,10 @@
 // What the page says: while it loads, when something goes wrong, and what has changed.
 
-import { SiteError } from "./loading.js";
+import { FileError, SiteError } from "./loading.js";
 
 const message = /** @type {HTMLElement} */ (document.getElementById("message"));
+const retry = /** @type {HTMLButtonElement} */ (document.getElementById("again"));
+const rest = /** @type {HTMLElement} */ (document.getElementById("rest"));
 const said = /** @type {HTMLElement} */ (document.getElementById("said"));
 /** @type {any} */
 let fault = null;
@@ -10,6 +12,11 @@ let fault = null;
 /** Say over the picture how far the page is; a fault stays. @param {string} text */
 export function tell(text) {
   if (!fault) message.textContent = text;
+}
+
+/** Say beside the picture how much of the rest has arrived; not aloud. @param {string} text */
+export function tellRest(text) {
+  rest.textContent = text;
 }
 
 /** Say what has changed; it fades, but for what `stays`. @param {string} text */
@@ -25,5 +32,13 @@ export function failed(error) {
   fault = error;
   message.textContent =
     error instanceof SiteError ? error.message : `The room cannot be shown: ${error.message ?? error}`;
+  retry.hidden = !(error instanceof FileError);
   if (!(error instanceof SiteError)) throw error;
+}
+
+/** Say nothing more of the last fault. */
+export function forgive() {
+  fault = null;
+  retry.hidden = true;
+  tell("");
 }

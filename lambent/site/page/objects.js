@@ -1,10 +1,11 @@
 // The objects of WebGPU that a manifest describes, and their contents.
 
-import { readText } from "./loading.js";
+import { enlarged, readText } from "./loading.js";
 
 /** @typedef {import("./loading.js").Data} Data */
 
 export const CANVAS = "canvas";
+const AT_ONCE = 4; // files on their way: enough to fill a line, so few that the first is there first
 const WORDS = ["rgb10a2unorm", "rgb9e5ufloat", "depth32float"]; // of 4 bytes a texel
 
 /** Bytes of a block, and its texels a side. @param {string} format @returns {[number, number]} */
@@ -37,6 +38,10 @@ export class Objects {
     this.width = this.height = 0;
     /** @type {Record<string, Record<string, any>>} contents other than the tables say, by kind and place */
     this.changed = {};
+    /** @type {Set<number>} places of textures that stand-ins fill */
+    this.coarse = new Set();
+    /** @type {Promise<void>} one state's objects are made after another's */
+    this.loaded = Promise.resolve();
   }
 
   /**
@@ -45,7 +50,8 @@ export class Objects {
    * @param {() => boolean} isWanted
    */
   async show(counts, changes, data, isWanted) {
-    await this.load(counts, data);
+    const load = () => this.load(counts, data);
+    await (this.loaded = this.loaded.then(load, load));
     /** @type {[string, number, any][]} kind, place and data of what differs from what is shown */
     const differ = [];
     for (const [kind, places] of Object.entries(this.changed)) {
@@ -71,7 +77,7 @@ export class Objects {
     const [modules, buffers, textures] = await Promise.all([
       Promise.all(lacking("shader_module").map((one) => readText(one.file))),
       Promise.all(lacking("buffer").map((one) => data.read(one.data))),
-      Promise.all(lacking("texture").map((one) => (one.data ? data.read(one.data) : null))),
+      Promise.all(lacking("texture").map((one) => (one.data ? data.read(one.data.standin ?? one.data) : null))),
     ]);
     add(
       "shader_module",
@@ -87,7 +93,7 @@ export class Objects {
         kind,
         ones.map((one) => (one.data ? this.create(kind, one) : null)),
       );
-      contents.forEach((content, i) => content && this.write(kind, first + i, content));
+      contents.forEach((content, i) => content && this.begin(kind, first + i, content));
     }
     add(
       "sampler",
@@ -121,6 +127,28 @@ export class Objects {
     this.counts = counts;
   }
 
+  /** Write the first content, of a texture that of its stand-in. @param {string} kind @param {number} at @param {any} content */
+  begin(kind, at, content) {
+    const { data, size, format, mipLevelCount = 1 } = this.manifest.tables[kind][at];
+    if (!data.standin) return this.write(kind, at, content);
+    this.write(kind, at, enlarged(content, size, mipLevelCount, data.standin.finest, blockOf(format)[0]));
+    this.coarse.add(at);
+  }
+
+  /** Replace stand-ins by what they stand for, in this order. @param {number[]} order @param {Data} data @param {() => void} finer called after each */
+  async refine(order, data, finer) {
+    const places = order.filter((at) => this.coarse.has(at));
+    const one = async () => {
+      for (let at = places.shift(); at !== undefined; at = places.shift()) {
+        const content = await data.read(this.manifest.tables.texture[at].data);
+        if (!this.coarse.has(at)) continue; // a state has changed it meanwhile
+        this.write("texture", at, content);
+        finer();
+      }
+    };
+    await Promise.all(Array.from({ length: AT_ONCE }, one));
+  }
+
   /** A buffer or texture that content is written to. @param {string} kind @param {any} one */
   create(kind, one) {
     if (kind === "buffer") {
@@ -136,6 +164,7 @@ export class Objects {
   write(kind, at, content) {
     const one = this.manifest.tables[kind][at],
       made = this.made[kind][at];
+    if (kind === "texture") this.coarse.delete(at);
     if (content instanceof ImageBitmap) return this.copy(one, made, content);
     if (kind === "buffer") return this.device.queue.writeBuffer(made, 0, content);
     const isDepth = one.format === "depth32float";

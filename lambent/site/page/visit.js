@@ -49,10 +49,9 @@ export class Visit extends EventTarget {
     this.frames = 0;
   }
 
-  /** Show the room by a frame and its data. @param {Frame} frame @param {Data} data @param {Geometry} geometry */
-  async take(frame, data, geometry) {
-    if (this.state) await frame.show(this.state, data);
-    Object.assign(this, { frame, data, geometry });
+  /** Show the room by a frame and its data. @param {Frame} frame @param {Data} data */
+  take(frame, data) {
+    Object.assign(this, { frame, data });
     this.changed();
   }
 
