@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -46,7 +46,7 @@ from lambent.realtime.passes.depth import DepthPass
 from lambent.realtime.passes.light import LightPass
 from lambent.realtime.planar.planar_integrators import planar_integrator
 from lambent.realtime.planar.planar_pass import PlanarPass
-from lambent.realtime.planar.planar_view import MOST_REFLECTORS, PlanarView, planar_views
+from lambent.realtime.planar.planar_view import MOST_REFLECTORS, PlanarView, planar_views, views_of_any_camera
 from lambent.realtime.planar.reflector_faces import ReflectorFaces
 from lambent.realtime.resources import SceneResources
 from lambent.realtime.sun.sun_pass import SunPass
@@ -90,13 +90,14 @@ class Renderer:
         )
         self.streaming: Streaming = beside.streaming if beside else Streaming(scene, self.resources.objects)
         self.mixer: LightMixer = beside.mixer if beside else LightMixer(layouts, scene, self.resources)
-        self.waits, self._reflector_faces = True, ReflectorFaces(scene)
+        self.waits, self.reflector_faces = True, ReflectorFaces(scene)
         depth, base = DepthPass(layouts), BasePass(layouts)
-        planar = PlanarPass(layouts, depth)
+        self.planar = planar = PlanarPass(layouts, depth)
         light = LightPass(layouts, planar.reflections)
         display = TonemapPass(layouts), SmoothPass(layouts)
+        self.cover, self.accumulate = CoverPass(layouts, depth, light), AccumulatePass(layouts)
         self._passes: tuple[Pass, ...] = (
-            depth, SunPass(layouts), planar, base, light, CoverPass(layouts, depth, light), AccumulatePass(layouts),
+            depth, SunPass(layouts), planar, base, light, self.cover, self.accumulate,
             *display,
         )  # fmt: skip
         self._targets, self._timer = Targets(device), PassTimer(device)
@@ -125,12 +126,16 @@ class Renderer:
     def frame(self, state: FrameState, commands: Commands, target_view: Any = None, *, whole: bool = False) -> Any:
         """Write the passes of a frame into `commands`; returns the texture of linear radiance that they leave.
 
-        `whole`: with the faces out of view, for other cameras.
+        `whole`: for other cameras, with the faces out of view and all mirrored views.
         """
-        context = self._frame_context(commands, state, target_view)
-        context.whole = whole
+        context = self._frame_context(commands, state, target_view, whole)
         self._encode(context)
         return context.radiance
+
+    @property
+    def clusters(self) -> Clusters:
+        """What is seen of the scene."""
+        return self._clusters
 
     @property
     def frame_buffer(self) -> Any:
@@ -254,7 +259,7 @@ class Renderer:
             "samples_per_pixel": max((d.n * d.lobes for d in context.draws if d.integrator.specular), default=0),
         }
 
-    def _frame_context(self, encoder: Any, state: FrameState, target_view: Any) -> FrameContext:
+    def _frame_context(self, encoder: Any, state: FrameState, target_view: Any, whole: bool = False) -> FrameContext:
         """A frame before its first pass."""
         state.check()
         data = frame_data(state, self.scene.record.bounds)
@@ -263,36 +268,48 @@ class Renderer:
         self.device.queue.write_buffer(self._frame_buffer, 0, data.tobytes())
         self.mixer.follow(state.light, waits=self.waits)
         panes = panes_of(state, self.resources)
-        views = self._planar_views(state, data, panes)
+        views = self._planar_views(state, data, whole)
         reflecting = {part.object for view in views for part in view.reflector.parts}
         draws = draws_of(state, self.resources, reflecting, panes)
         self.streaming.follow(draws, data, waits=self.waits)
         passing = target_view is not None and state.accumulate is None  # seen once, so half floats do
-        halves = passing or self.resources.mixes_parts or panes  # single precision cannot be blended everywhere
+        halves = (
+            passing or whole or self.resources.mixes_parts or panes
+        )  # single precision cannot be blended everywhere
         target = self._targets.fit(state.size, "rgba16float" if halves else "rgba32float", passing=passing)
         context = FrameContext(
             encoder, state, data, self._frame_group, self.resources, self._clusters, self._targets, self._timer, target,
             [draw for draw in draws if not draw.is_pane], [draw for draw in draws if draw.is_pane], views, Counter(),
-            shown=target_view,
+            shown=target_view, whole=whole,
         )  # fmt: skip
         if passing and state.over:
             context.base, context.redrawn = self._few, self.redrawn(state)
         return context
 
-    def _planar_views(self, state: FrameState, data: Record, panes: Collection[str]) -> list[PlanarView]:
-        """Mirrored views of the planar reflectors that have a buffer in this frame; `panes` have their probes."""
+    def reflectors(self, state: FrameState) -> list[int]:
+        """Numbers of the scene's reflectors that a frame may mirror; those of clear glass have their probes."""
         if planar_integrator(state.integrator, state.planar) is None or not SHOW[state.show][1]:
             return []
+        panes = panes_of(state, self.resources)
+        return [k for k, r in enumerate(self.scene.record.reflectors) if any(p.object not in panes for p in r.parts)]
+
+    def widest(self, state: FrameState) -> dict[str, float]:
+        """The largest m of each object's lobes, by its name."""
         record, shown = self.scene.record, {**self.scene.record.materials, **state.materials}
-        widest = {
+        return {
             o.name: max((max(widths(lobe)) for lobe in shown[o.material].lobes if not lobe.retro), default=0.0)
             for o in record.objects
         }
-        wanted = [k for k, r in enumerate(record.reflectors) if any(part.object not in panes for part in r.parts)]
-        reflectors, shares = (
-            [record.reflectors[k] for k in wanted],
-            self._reflector_faces.shares(data)[np.array(wanted, int)],
-        )
+
+    def _planar_views(self, state: FrameState, data: Record, whole: bool) -> list[PlanarView]:
+        """Mirrored views of the planar reflectors that have a buffer in this frame."""
+        wanted = self.reflectors(state)
+        reflectors = [self.scene.record.reflectors[k] for k in wanted]
+        if whole:
+            return views_of_any_camera(data, reflectors, state.size)
+        if not wanted:
+            return []
+        shares, widest = self.reflector_faces.shares(data)[np.array(wanted)], self.widest(state)
         return planar_views(data, reflectors, state.width, state.height, MOST_REFLECTORS, widest, shares)
 
 

@@ -19,17 +19,16 @@ from lambent.core.inputs import read_head
 from lambent.core.light.exposure import metered
 from lambent.core.light.light_mix import MixTrack
 from lambent.core.progress import Progress, silent, tracked
-from lambent.realtime.frame_state import VIEW_TRANSFORMS, FrameState, frame_data, near_of
-from lambent.realtime.gpu.commands import Commands
+from lambent.realtime.frame_state import VIEW_TRANSFORMS, FrameState
 from lambent.realtime.gpu.described import DescribedDevice
 from lambent.realtime.gpu.device import open_device
-from lambent.realtime.gpu.structs import FRAME_DTYPE
 from lambent.realtime.light.baked import read_baked
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.resources import device_needs
 from lambent.render.applied_materials import AppliedMaterials
 from lambent.render.output import ignore
 from lambent.scenes.scene import Variant
+from lambent.site.cameras import cameras_of, frames_of, widest
 from lambent.site.manifest import Manifest, camel
 from lambent.site.things import things
 from lambent.store.kept.states import lamps_of, variants_of
@@ -69,25 +68,26 @@ def export(store: Store, folder: Path, progress: Progress = silent, note: Note =
     renderer = Renderer(device, baked)
     saved = read_views(store.folder).cameras
     cameras = [*baked.record.cameras, *(one for one in saved if one.name not in {c.name for c in baked.record.cameras})]
-    state = FrameState(cameras[0], *SIZE, planar="off")
+    state = FrameState(cameras[0], *SIZE)
     exposure_ev = baked.record.exposure_ev
     if exposure_ev is None:
         exposure_ev = metered(renderer.image(state)) or 0.0
-    _write_poster(renderer, replace(state, exposure_ev=exposure_ev, planar="auto"), folder / "poster.jpg")
+    _write_poster(renderer, replace(state, exposure_ev=exposure_ev), folder / "poster.jpg")
     shown = renderer.target(DISPLAY, SIZE).create_view()
     manifest, states, rooms = Manifest(device, folder, SIZE, shown), [], list(_states(store, renderer, state, note))
+    of_cameras = cameras_of(renderer, manifest, state)
     for room, now in tracked(rooms, progress, "states"):
-        commands = Commands()
-        renderer.frame(now(), commands, shown, whole=True)
-        states.append(manifest.state(room.name or BAKED, commands))
+        one = now()
+        said = {"name": room.name or BAKED, "m": widest(renderer, one)}
+        states.append({**said, **manifest.state(frames_of(renderer, one, shown))})
     document = {
         "format": FORMAT, "version": VERSION, "name": baked.record.name,
         "cameras": [camel(asdict(one)) for one in cameras],
         "bounds": np.asarray(baked.record.bounds).tolist(), "exposureEv": exposure_ev, "unit": baked.unit,
         "viewTransform": VIEW_TRANSFORMS[state.view_transform],
-        "frame": _frame(manifest.refer(renderer.frame_buffer), state, baked.record.bounds),
+        **of_cameras,
         "visit": things(store.folder, baked.record, renderer.resources, manifest, [room for room, _ in rooms]),
-        "tables": manifest.tables, "states": states,
+        "tables": manifest.tables, "passes": manifest.passes, "states": states,
     }  # fmt: skip
     write_text(folder / "manifest.json", json.dumps(document, separators=(",", ":"), allow_nan=False))
     _copy_page(folder)
@@ -147,17 +147,6 @@ def _write_poster(renderer: Renderer, state: FrameState, file: Path) -> None:
 
     width, height = POSTER
     Image.fromarray(renderer.still(replace(state, width=width, height=height))).save(file, quality=85)
-
-
-def _frame(place: int, state: FrameState, bounds: Any) -> dict[str, Any]:
-    """The uniform of a frame: its buffer, its bytes in a fresh frame, and where the camera's fields are."""
-    data = frame_data(state, bounds)
-    fields: Any = FRAME_DTYPE.fields
-    of_camera = ("clip_from_world", "eye", "across", "up", "forward", "exposure", "view_transform")
-    return {
-        "buffer": place, "bytes": list(data.tobytes()), "nearM": near_of(bounds),
-        "offsets": {name: fields[name][1] for name in of_camera},
-    }  # fmt: skip
 
 
 def _copy_page(folder: Path) -> None:

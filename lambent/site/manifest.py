@@ -7,6 +7,7 @@ that the page passes them on as they are.
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 from collections import Counter, defaultdict
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ from lambent.realtime.gpu.commands import Commands, RenderPass
 from lambent.realtime.gpu.described import DescribedDevice, Made
 from lambent.realtime.gpu.pipelines import VERTEX_FLOATS
 from lambent.realtime.gpu.read_back import BLOCKS, buffer_bytes, texel, texture_levels
+from lambent.realtime.planar.planar_view import whole_window
 from lambent.site.chunks import TALLEST_PX, Chunks, Packing
 from lambent.site.standins import LARGE, standin
 from lambent.site.vertices import UNITS, words_of
@@ -28,6 +30,7 @@ VERTEX, INDEX = 0x20, 0x10  # usages of buffers
 FACES = 6  # of a cube
 COLOURS = "rgba8unorm-srgb"  # of textures
 CANVAS = "canvas"  # stands for the texture that is shown, and for the size of textures that follow it
+MIRROR = "mirror"  # for the size of buffers of mirrored views (`whole_window`)
 
 
 class Manifest:
@@ -36,26 +39,41 @@ class Manifest:
     def __init__(self, device: DescribedDevice, folder: Path, size: tuple[int, int], shown: Any) -> None:
         """`shown` is the view of the display image, of `size`."""
         self._device, self._folder, self._size, self._shown = device, folder, size, shown
+        wide, _ = whole_window(size)
+        self._mirrored = int(wide[0]), int(wide[1])
         self.chunks = Chunks(folder)
         self.tables: dict[str, list[Any]] = defaultdict(list)
         self._places: dict[int, int] = {}
         self._drawn: set[int] = set()  # textures that frames draw into
+        self.passes: list[dict[str, Any]] = []
+        self._passes: dict[str, int] = {}  # places, by content
+        self._equal: dict[str, int] = {}  # places of objects, by kind and description
+        self._written: set[int] = set()  # buffers that the page writes for each frame
         self._data: dict[tuple[str, int], Any] = {}  # objects with content, by kind and place
 
-    def state(self, name: str, commands: Commands) -> dict[str, Any]:
-        """A state of the room: its passes, how many objects of each kind exist then, and contents other than at first.
+    def state(self, frames: dict[str, Commands]) -> dict[str, Any]:
+        """A state of the room: its frames, how many objects of each kind exist then, and contents other than at first.
 
-        The contents of the first state are those of the tables.
+        A frame is the places of its passes in the table of passes. The contents of the first state are those of the
+        tables.
         """
         known = {place: dict(self.tables[place[0]][place[1]].get("data", {})) for place in self._data}
-        passes, changes = self._passes(commands), defaultdict[str, dict[int, Any]](dict)
+        self._drawn |= {
+            id(self._device.made[id(view)].descriptor["texture"])
+            for commands in frames.values()
+            for one in commands.passes
+            for view in _attached(one)
+        }
+        found = {name: [self._place_of(one) for one in commands.passes] for name, commands in frames.items()}
+        changes = defaultdict[str, dict[int, Any]](dict)
         for (kind, at), before in known.items():
             now = self._content(self._data[kind, at])
             if now["sha256"] != before["sha256"]:
                 changes[kind][at] = now
         counts = {kind: len(table) for kind, table in self.tables.items()}
         return {
-            "name": name, "counts": counts, "changes": changes, "passes": passes, "finer": self._finer(commands.passes),
+            "counts": counts, "changes": changes, "frames": found,
+            "finer": self._finer([one for commands in frames.values() for one in commands.passes]),
         }  # fmt: skip
 
     def _finer(self, passes: Sequence[RenderPass]) -> list[int]:
@@ -74,22 +92,37 @@ class Manifest:
         large = [at for at, one in enumerate(textures) if "standin" in one.get("data", {})]
         return sorted(large, key=lambda at: (-draws[at], textures[at]["data"]["packed"]))
 
-    def _passes(self, commands: Commands) -> list[dict[str, Any]]:
-        views = [view for one in commands.passes for view in _attached(one)]
-        self._drawn |= {id(self._device.made[id(view)].descriptor["texture"]) for view in views}
-        return [self._pass(one) for one in commands.passes]
+    def _place_of(self, one: RenderPass) -> int:
+        """The place of a pass in the table of passes; equal ones share it."""
+        described = self._pass(one)
+        key = json.dumps(described, sort_keys=True)
+        if key not in self._passes:
+            self._passes[key] = len(self.passes)
+            self.passes.append(described)
+        return self._passes[key]
 
     def refer(self, one: Any) -> int:
         """The place of an object in the list of its kind."""
         made = self._device.made[id(one)]
         if id(one) not in self._places:
-            described = getattr(self, f"_{made.kind}")(made)
-            table = self.tables[made.kind]
-            self._places[id(one)] = len(table)
-            if "data" in described:
-                self._data[made.kind, len(table)] = one
-            table.append(described)
+            self._places[id(one)] = self._added(made, getattr(self, f"_{made.kind}")(made))
         return self._places[id(one)]
+
+    def written(self, buffer: Any) -> int:
+        """The place of a buffer that the page writes for each frame: it has no content here."""
+        self._written.add(id(buffer))
+        return self.refer(buffer)
+
+    def _added(self, made: Made, described: dict[str, Any]) -> int:
+        """The place of a new object. Objects without content of their own share that of an equal one."""
+        key, table = json.dumps([made.kind, described], sort_keys=True), self.tables[made.kind]
+        has_content = made.kind in ("buffer", "texture")
+        if has_content or key not in self._equal:
+            self._equal[key] = len(table)
+            if "data" in described:
+                self._data[made.kind, len(table)] = made.one
+            table.append(described)
+        return self._equal[key]
 
     def _pass(self, one: RenderPass) -> dict[str, Any]:
         colours = [{**camel(a), "view": self._view_or_canvas(a["view"])} for a in one.attachments["color_attachments"]]
@@ -97,8 +130,20 @@ class Manifest:
         found: dict[str, Any] = {"colorAttachments": colours}
         if depth is not None:
             found["depthStencilAttachment"] = {**camel(depth), "view": self.refer(depth["view"])}
+        if one.view is not None:
+            found["view"] = one.view
+        if (camera := self._camera(one)) is not None:
+            found["camera"] = camera
         found["commands"] = [[_word(name), *map(self._argument, given)] for name, given in one.commands]
         return found
+
+    def _camera(self, one: RenderPass) -> int | None:
+        """The place of the buffer with the camera's record, if a pass reads one: the first entry of group 0."""
+        group = next((given[1] for name, given in one.commands if name == "set_bind_group" and given[0] == 0), None)
+        if group is None:
+            return None
+        found = self._device.made[id(group)].descriptor["entries"][0]["resource"]
+        return self.refer(found["buffer"]) if isinstance(found, dict) else None
 
     def _view_or_canvas(self, view: Any) -> int | str:
         return CANVAS if view is self._shown else self.refer(view)
@@ -107,13 +152,14 @@ class Manifest:
         return self.refer(one) if id(one) in self._device.made else one
 
     def _buffer(self, made: Made) -> dict[str, Any]:
-        return {"usage": made.descriptor["usage"], "size": made.one.size, "data": self._content(made.one)}
+        found = {"usage": made.descriptor["usage"], "size": made.one.size}
+        return found if id(made.one) in self._written else {**found, "data": self._content(made.one)}
 
     def _texture(self, made: Made) -> dict[str, Any]:
         size, drawn = tuple(made.one.size), id(made.one) in self._drawn
-        follows = drawn and size[:2] == self._size
+        follows = {self._size: CANVAS, self._mirrored: MIRROR}.get(size[:2]) if drawn else None
         found = {
-            **camel(made.descriptor), "size": [CANVAS, CANVAS, *size[2:]] if follows else list(size),
+            **camel(made.descriptor), "size": [follows, follows, *size[2:]] if follows else list(size),
             "format": made.one.format,
         }  # fmt: skip
         return found if drawn else {**found, "data": self._with_standin(made.one)}

@@ -12,10 +12,15 @@ from pathlib import Path
 import pytest
 
 import lambent
+from lambent.baking.bake import bake
+from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
+from lambent.scenes.geometry import box, patch, placed
+from lambent.scenes.scene import Scene, SceneObject
 from lambent.site import export, manifest
 from lambent.site.serving import SiteServer
 from lambent.store.kept.session import FILE, RoomState, WalkSession, write_session
+from tests.baking.small_scenes import TINY, turned_inwards
 
 PAGE = Path(export.__file__).parent / "page"
 STILLS_PAGE = PAGE.with_name("stills_page")
@@ -106,4 +111,45 @@ def streamed_site(adapter, blue_box, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(manifest, "LARGE", 1000)
         lambent.export(blue_box, folder)
+    return folder
+
+
+def hall() -> Scene:
+    """A room with what depends on the camera: glossy floor, mirror with two sides, panes behind panes, thin bars."""
+    glass = Material(lobes=(Lobe(mx=0.003, my=0.003, r0=0.04, k=(0.8, 0.95, 0.9), side="transmission"),))
+    materials = {
+        "paint": Material(kd=(0.6, 0.5, 0.4)), "glass": glass, "red": Material(kd=(0.7, 0.1, 0.1)),
+        "lacquer": Material(kd=(0.05, 0.1, 0.2), lobes=(Lobe(mx=0.05, my=0.05, r0=0.2),)),
+        "mirror": Material(lobes=(Lobe(mx=0.01, my=0.01, r0=0.9),)), "lamp": Material(),
+    }  # fmt: skip
+    walls = turned_inwards(placed(box((4, 2.5, 4)), (0, 1.25, 0)))
+    bars = [
+        SceneObject(f"bar {k}", placed(box((0.006, 1.2, 0.006)), (-1.2 + 0.08 * k, 0.9, -0.9)), "red")
+        for k in range(12)
+    ]
+    panes = [
+        SceneObject(f"pane {k}", patch((0.2 + 0.1 * k, 0.3, 0.4 + 0.35 * k), (0.9, 0, 0.2), (0, 1.1, 0)), "glass")
+        for k in range(3)
+    ]
+    objects = (
+        SceneObject("walls", walls, "paint"),
+        SceneObject("floor", patch((-1.9, 0.01, 1.9), (3.8, 0, 0), (0, 0, -3.8)), "lacquer"),
+        SceneObject("mirror", patch((-1.5, 0.4, 0.9), (0.5, 0, -0.9), (0, 1.4, 0)), "mirror"),
+        SceneObject("lamp", patch((-0.5, 2.4, -0.5), (1, 0, 0), (0, 0, 1)), "lamp", emission=(6, 6, 5)),
+        *bars, *panes,
+    )  # fmt: skip
+    return Scene("hall", objects, materials, cameras=(Camera("entrance", (0.5, 1.3, 1.8), (-0.2, 0.7, -0.6)),))
+
+
+@pytest.fixture(scope="session")
+def hall_store(mi, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("hall") / "hall.store"
+    bake(hall(), folder, quality=TINY).close()
+    return folder
+
+
+@pytest.fixture(scope="session")
+def hall_site(adapter, hall_store, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("site") / "hall"
+    lambent.export(hall_store, folder)
     return folder

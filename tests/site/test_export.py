@@ -61,7 +61,8 @@ def test_every_file_is_there_and_holds_what_the_manifest_says(box_site):
 
 def test_the_frame_has_the_faces_out_of_view(baked_box, box_site):
     faces = sum(one.face_count for one in scene_record(Store.open(baked_box)).objects)
-    depth = manifest_of(box_site)["states"][0]["passes"][0]
+    manifest = manifest_of(box_site)
+    depth = manifest["passes"][manifest["states"][0]["frames"]["plain"][0]]
     drawn = sum(command[1] for command in depth["commands"] if command[0] == "drawIndexed")
     assert drawn == 3 * faces
 

@@ -34,11 +34,14 @@ def said(camera: Camera) -> dict[str, object]:
     return {"name": camera.name, **names}
 
 
-def test_frames_of_cameras_are_those_of_python(javascript):
-    given = [[said(camera), 640, 360, 0.013] for camera in CAMERAS]
+@pytest.mark.parametrize("jitter", [(0.0, 0.0), (0.3, -0.45)])
+def test_frames_of_cameras_are_those_of_python(javascript, jitter):
+    given = [[said(camera), 640, 360, 0.013, jitter] for camera in CAMERAS]
     found = javascript("import {frameOf} from './camera.js'; say(given.map((one) => frameOf(...one)));", given)
     for camera, fields in zip(CAMERAS, found, strict=True):
-        data = frame_data(FrameState(camera, 640, 360, near_m=0.013), BOUNDS)
+        data = frame_data(FrameState(camera, 640, 360, near_m=0.013, jitter_px=jitter), BOUNDS)
+        rows = fields.pop("rows")
+        assert np.array(rows).T.ravel().tolist() == fields["clip_from_world"]
         for name, values in fields.items():
             wanted = data[name].ravel()[: len(values)]
             np.testing.assert_allclose(

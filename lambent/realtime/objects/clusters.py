@@ -27,10 +27,14 @@ MERGED_GAP = 256  # faces; runs with a smaller gap are drawn in one call, which 
 
 @dataclass(frozen=True)
 class Seen:
-    """Runs of faces, in order, none across the border of two objects: [begin, end)."""
+    """Runs of faces, in order, none across the border of two objects: [begin, end).
+
+    `thin`: of these a camera draws only the faces that may miss all pixel centres (`RenderPass.draw_thin`).
+    """
 
     begin: list[int]
     end: list[int]
+    thin: bool = False
 
     def of(self, first_face: int, face_count: int) -> Ranges:
         """(first, count) of each run within a range of faces."""
@@ -64,6 +68,15 @@ class Clusters:
         moves = np.array([o.luminaire is not None for o in ordered], bool)  # with its lamp: it is never culled
         self._half[moves[self._owner]] = ANYWHERE_M
         self._largest = np.maximum(np.abs(low), np.abs(high))
+
+    def table(self) -> tuple[NDArray[np.uint32], NDArray[np.float32]]:
+        """What `seen` and `thin` know of each cluster.
+
+        (K, 3): first face, the one after the last, number of the object; (K, 10), metres: middle, half of the size,
+        largest coordinates, narrowest sliver.
+        """
+        places = np.column_stack([self._begin, self._end, self._owner]).astype(np.uint32)
+        return places, np.column_stack([self._centre, self._half, self._largest, self._sliver_m]).astype(np.float32)
 
     def with_any(self, faces: Flags) -> Flags:
         """The clusters that hold any of the faces (F,)."""

@@ -22,7 +22,7 @@ class AccumulatePass:
         self._layouts = layouts
         self._layout = layouts.of("exact", "exact", "uniform")
         self._pipeline = screen_pipeline(layouts.device, "accumulate", [self._layout], [MEAN_FORMAT])
-        self._weight = layouts.uniform(16)
+        self.weight = layouts.uniform(16)
         self._means = lru_cache(1)(self._new_means)
 
     def encode(self, context: FrameContext) -> None:
@@ -31,7 +31,7 @@ class AccumulatePass:
         if index is None:
             return
         weight = np.array([1 / (index + 1), 0, 0, 0], np.float32)
-        self._layouts.device.queue.write_buffer(self._weight, 0, weight)
+        self._layouts.device.queue.write_buffer(self.weight, 0, weight)
         mean, group = self._means(context.radiance)[index % 2]
         context.cover("accumulate", [mean.create_view()], self._pipeline, [group])
         context.radiance = mean
@@ -40,6 +40,6 @@ class AccumulatePass:
         """Both images, each with the bind group that reads the other image and the frame."""
         means = [target_texture(self._layouts.device, frame.size, MEAN_FORMAT) for _ in range(2)]
         return [
-            (mean, self._layouts.group(self._layout, before.create_view(), frame.create_view(), self._weight))
+            (mean, self._layouts.group(self._layout, before.create_view(), frame.create_view(), self.weight))
             for mean, before in zip(means, means[::-1], strict=True)
         ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from lambent.core.arrays import Flags
@@ -42,7 +42,7 @@ class FrameContext:
     light: tuple[Any, ...] = ()  # resources of group 3: light maps, the sun, and its visible share by pixel
     pane_light: tuple[Any, ...] = ()  # `light` for panes
     reflections: Any = None  # group 3 of draws with pixels on planar reflectors
-    whole: bool = False  # faces out of view are drawn too
+    whole: bool = False  # for other cameras: with faces out of view, and all mirrored views
 
     @property
     def is_passing(self) -> bool:
@@ -77,6 +77,8 @@ class FrameContext:
 
     def thin(self) -> Seen:
         """The faces in view that may miss all pixel centres."""
+        if self.whole:
+            return replace(self.clusters.whole(), thin=True)
         return self.clusters.thin(self.data["clip_from_world"].T, self.state.height)
 
     def begin(self, name: str, views: Iterable[Any], load_op: str, depth: str = "load") -> Any:

@@ -75,7 +75,7 @@ class CoverPass:
     def __init__(self, layouts: Layouts, depth: DepthPass, light: LightPass) -> None:
         self._layouts, self._depth, self._light = layouts, depth, light
         self._covering = lru_cache(1)(lambda size: Covering.of(layouts.device, size))
-        self._uniforms = [layouts.uniform(FRAME_DTYPE.itemsize) for _ in PLACES]
+        self.uniforms = [layouts.uniform(FRAME_DTYPE.itemsize) for _ in PLACES]
 
     @cached_property
     def _pipelines(self) -> Pipelines:  # frames that do not ask for it never wait for its shaders
@@ -104,7 +104,7 @@ class CoverPass:
         """The frame as it is seen through each place."""
         made = []
         bounds = context.resources.scene.record.bounds
-        for at, uniform, depth in zip(PLACES, self._uniforms, covering.places, strict=True):
+        for at, uniform, depth in zip(PLACES, self.uniforms, covering.places, strict=True):
             jitter = (context.state.jitter_px[0] + at[0], context.state.jitter_px[1] + at[1])
             moved, data = frame_data(replace(context.state, jitter_px=jitter), bounds), context.data.copy()
             for name in ("clip_from_world", "forward"):

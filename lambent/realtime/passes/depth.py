@@ -58,11 +58,12 @@ def set_geometry(render: Any, resources: SceneResources) -> None:
 
 def draw_seen(render: Any, seen: Seen, first_face: int, face_count: int) -> int:
     """Encode the visible faces of a range; returns the draw calls."""
-    return draw_runs(render, seen.of(first_face, face_count))
+    return draw_runs(render, seen, seen.of(first_face, face_count))
 
 
-def draw_runs(render: Any, runs: Ranges) -> int:
-    """Encode runs (first, count) of faces; returns the draw calls."""
+def draw_runs(render: Any, seen: Seen, runs: Ranges) -> int:
+    """Encode runs (first, count) of the faces seen; returns the draw calls."""
+    draw = render.draw_thin if seen.thin else render.draw_indexed
     for first, count in runs:
-        render.draw_indexed(count * 3, 1, first * 3)
+        draw(count * 3, 1, first * 3)
     return len(runs)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from lambent.core.arrays import Floats
 from lambent.realtime.frame_state import LIGHT_MAP_NOISE
 from lambent.realtime.gpu.layouts import Layouts
 from lambent.realtime.gpu.pipelines import pipeline, screen_pipeline
@@ -84,7 +85,7 @@ class Shading:
                 if wanted[number] is not bound[number]:
                     render.set_bind_group(number, wanted[number])
             bound = wanted
-            context.counts["draw_calls"] += draw_runs(render, runs)
+            context.counts["draw_calls"] += draw_runs(render, seen, runs)
 
     def _is_reflecting(self, draw: Draw) -> bool:
         return draw.planar and self._reflections is not None
@@ -129,10 +130,15 @@ class Glazing:
         light = self._layouts.group(self._layouts.light, *context.pane_light)
         eye = context.data["eye"][:3]
 
+        def middle_m(pane: Draw) -> Floats:
+            return np.asarray(np.mean(pane.item.record.bounds, axis=0))
+
         def distance(pane: Draw) -> float:
-            return float(np.linalg.norm(np.mean(pane.item.record.bounds, axis=0) - eye))
+            return float(np.linalg.norm(middle_m(pane) - eye))
 
         for pane in sorted(context.panes, key=distance, reverse=True):
+            if context.whole:
+                render.begin_pane(middle_m(pane))
             for shading in (self._passing, self._mirroring):
                 shading.draw(render, context, [pane], seen, formats, light)
 

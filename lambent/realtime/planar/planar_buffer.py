@@ -59,7 +59,7 @@ class PlanarWalls:
             layouts.device, "planar_walls", groups, (), compare="always", writes_depth=True
         )
         self._texture = cache(self._uploaded)
-        self._uniform = cache(lambda index: layouts.uniform(PLAN_DTYPE.itemsize))
+        self.uniform = cache(lambda index: layouts.uniform(PLAN_DTYPE.itemsize))
 
     def draw(self, render: Any, index: int, view: PlanarView) -> int:
         """Encode first into a depth pass whose group 0 is set; returns the draw calls.
@@ -68,10 +68,10 @@ class PlanarWalls:
         """
         if view.plan is None or view.reflector.plan is None:
             return 0
-        self._layouts.device.queue.write_buffer(self._uniform(index), 0, view.plan.tobytes())
+        self._layouts.device.queue.write_buffer(self.uniform(index), 0, view.plan.tobytes())
         texture = self._texture(view.reflector.plan)
         render.set_pipeline(self._pipeline)
-        render.set_bind_group(1, self._layouts.group(self._layout, self._uniform(index), texture))
+        render.set_bind_group(1, self._layouts.group(self._layout, self.uniform(index), texture))
         render.draw(3)
         return 1
 
@@ -122,11 +122,21 @@ class PlanarBufferPass:
             )  # fmt: skip
             yield frame, buffer
 
+    def uniforms(self, index: int) -> tuple[Any, Any, Any]:
+        """Buffers of a view, by its number: of FRAME_DTYPE, MIRRORED_VIEW_DTYPE and PLAN_DTYPE."""
+        return self._frame(index), self.uniform(index), self._walls.uniform(index)
+
     def encode(self, context: FrameContext, index: int, view: PlanarView, buffer: PlanarBuffer) -> None:
         """Draw a mirrored frame."""
         resources = context.resources
         render = context.begin("mirror", [], "clear", depth="clear")
-        context.counts["draw_calls"] += self._walls.draw(render, index, view) + self._depth.draw(render, context)
+        if context.whole and view.plan is not None:
+            render.only_upright()
+        context.counts["draw_calls"] += self._walls.draw(render, index, view)
+        if context.whole:
+            render.end()
+            render = context.begin("mirror", [], "load")
+        context.counts["draw_calls"] += self._depth.draw(render, context)
         render.end()
         self._sun.encode(context)
         light = self._layouts.group(self._layouts.light, *context.light)

@@ -44,14 +44,22 @@ class PlanarPass:
         layers = [
             texture.create_view(dimension="2d", base_array_layer=i, array_layer_count=1) for i in range(FOUND + CLEANED)
         ]
+        if context.whole:
+            context.begin("planar", layers[:FOUND], "clear").end()  # which view is the first depends on the camera
         for index, (mirrored, buffer) in enumerate(self._buffers.mirrored(context)):
+            context.encoder.view = index
             self._buffers.encode(mirrored, index, context.views[index], buffer)
             self._encode_hits(context, index, how, buffer, layers[:FOUND])
+        context.encoder.view = None
         found = texture.create_view(dimension="2d-array", base_array_layer=0, array_layer_count=FOUND)
         group = self._layouts.group(self._layouts.of("exact layers"), found)
         context.cover("clean", layers[FOUND:], self._clean, [group])
         views = *context.light, texture.create_view(dimension="2d-array")
         context.reflections = self._layouts.group(self.reflections, *views)
+
+    def uniforms(self, index: int) -> tuple[Any, Any, Any]:
+        """Buffers of a mirrored view, by its number: of FRAME_DTYPE, MIRRORED_VIEW_DTYPE and PLAN_DTYPE."""
+        return self._buffers.uniforms(index)
 
     def _encode_hits(
         self, context: FrameContext, index: int, how: Integrator, buffer: PlanarBuffer, layers: list[Any]
@@ -62,6 +70,6 @@ class PlanarPass:
         group = self._layouts.group(self._hits, uniform, buffer.light, buffer.planes, light_maps)
         mine = (draw for draw in context.draws if draw.lobes and view.has(draw.item.record))
         draws = [draw.by(how, context.resources, draw.planar_n) for draw in mine]
-        render = context.begin("planar", layers, "load" if index else "clear")
+        render = context.begin("planar", layers, "load" if index or context.whole else "clear")
         self._shading.draw(render, context, draws, context.seen(), (FORMAT,) * FOUND, group)
         render.end()

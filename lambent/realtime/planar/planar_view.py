@@ -28,6 +28,7 @@ STEP_ROWS = 512  # of a large frame; the step of smaller ones halves with each h
 CLEARANCE = 1e-5  # over the reflector's highest vertex, of the largest coordinate: what lies below is not mirrored
 LEAST_SHARE = 2e-4  # of the frame: a reflector that covers less is left to its probes
 MOST_LEVELS = 7
+LEAST_WHOLE_PX = 2 << MOST_LEVELS
 MOST_REFLECTORS = 4  # of a frame; those that cover less of it are left to their probes
 
 
@@ -73,10 +74,31 @@ def planar_views(
         shown = on_screen(frame, np.asarray(reflector.outline, float))
         m = max((widest or {}).get(part.object, 0.0) for part in reflector.parts)
         place = _window(frame, (width, height), m, shown, step_px(height))
-        view = _view(frame, plane, reflector, (width, height), place, number)
+        view = view_through(frame, plane, reflector, (width, height), place, number)
         if view is not None:
             views.append(view)
     return views
+
+
+def views_of_any_camera(
+    frame: Record, reflectors: Sequence[ReflectorRecord], size: tuple[int, int]
+) -> list[PlanarView]:
+    """Views of all reflectors, with windows of the whole frame; their records wait for a camera (`lambent.site`)."""
+    wide, _ = whole_window(size)
+    return [
+        PlanarView(
+            reflector, frame.copy(), np.zeros((), MIRRORED_VIEW_DTYPE), (int(wide[0]), int(wide[1])),
+            None if reflector.plan is None else np.zeros((), PLAN_DTYPE),
+        )
+        for reflector in reflectors
+    ]  # fmt: skip
+
+
+def whole_window(size: tuple[int, int]) -> tuple[Floats, Floats]:
+    """Size of a buffer that shows all of a frame of `size` with MOST_LEVELS MIP levels, and the frame's first pixel."""
+    margin = max(MARGIN_PX, int(MOST_MARGIN * max(size)))
+    wide = np.array([max(-(-(length + 2 * margin) // STEP_PX) * STEP_PX, LEAST_WHOLE_PX) for length in size])
+    return wide, (wide - np.array(size)) // 2
 
 
 def clearance_m(reflector: ReflectorRecord, eye: Floats) -> float:
@@ -117,7 +139,7 @@ def _clipped(points: Floats, height: Floats) -> Floats:
     return np.array(kept).reshape(-1, points.shape[1])
 
 
-def _view(
+def view_through(
     frame: Record, plane: Floats, reflector: ReflectorRecord, size: tuple[int, int],
     place: tuple[Floats, Floats], number: int,
 ) -> PlanarView | None:  # fmt: skip

@@ -34,6 +34,10 @@ class ReflectorFaces:
         self._starts = np.cumsum([0, *map(len, corners)])[:-1]
         self._corners = np.concatenate(corners) if corners else np.zeros((0, 3, 3))
 
+    def corners(self, number: int) -> Floats:
+        """(F, 3, 3) corners, m, of a reflector's triangles."""
+        return np.asarray(np.split(self._corners, self._starts[1:])[number])
+
     def shares(self, frame: Record) -> Floats:
         """(R,) share of a frame (of FRAME_DTYPE) that the faces of each reflector cover, from either side."""
         if not len(self._corners):

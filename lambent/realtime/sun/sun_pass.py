@@ -69,7 +69,7 @@ class SunPass:
                 render.set_pipeline(
                     self._pipeline(draw.is_pane, draw.material.transmits, sun.parts, sun.squares, sun.pane_layers)
                 )
-                context.counts["draw_calls"] += draw_runs(render, runs)
+                context.counts["draw_calls"] += draw_runs(render, seen, runs)
         render.end()
 
 

@@ -55,27 +55,32 @@ export function axes(camera) {
 
 /**
  * The fields of a frame's record that depend on the camera.
- * @param {Camera} camera @param {number} width @param {number} height @param {number} nearM
+ * @param {Camera} camera @param {number} width @param {number} height @param {number} nearM @param {number[]} jitter px, right and down
  */
-export function frameOf(camera, width, height, nearM) {
+export function frameOf(camera, width, height, nearM, jitter = [0, 0]) {
   const [right, up, forward] = axes(camera);
   const half = Math.tan((camera.fovYDeg * Math.PI) / 360),
     x = height / (half * width),
     y = 1 / half;
   /** @param {Vector} axis */
   const behind = (axis) => -dot(axis, camera.position);
+  const ahead = [...forward, behind(forward)],
+    [aside, down] = [(2 * jitter[0]) / width, (2 * jitter[1]) / height];
   const rows = [
-    [...right, behind(right)].map((v) => x * v),
-    [...up, behind(up)].map((v) => y * v),
+    [...right, behind(right)].map((v, i) => x * v - aside * ahead[i]),
+    [...up, behind(up)].map((v, i) => y * v + down * ahead[i]),
     [0, 0, 0, nearM],
-    [...forward, behind(forward)],
+    ahead,
   ];
+  const across = /** @type {Vector} */ (right.map((v) => (v * half * width) / height)),
+    above = /** @type {Vector} */ (up.map((v) => v * half));
   return {
+    rows,
     clip_from_world: [0, 1, 2, 3].flatMap((column) => rows.map((row) => row[column])), // WGSL stores columns
     eye: camera.position,
-    across: right.map((v) => (v * half * width) / height),
-    up: up.map((v) => v * half),
-    forward,
+    across,
+    up: above,
+    forward: along(along(forward, across, aside), above, -down),
   };
 }
 

@@ -1,8 +1,43 @@
 // Draws the frame of a manifest.
 
 import { frameOf } from "./camera.js";
+import { Clusters, within } from "./culling.js";
 import { SiteError } from "./loading.js";
+import { mirroredViews } from "./mirrors.js";
 import { CANVAS, Objects } from "./objects.js";
+
+/** @typedef {import("./camera.js").Camera} Camera */
+/** @typedef {import("./loading.js").Data} Data */
+/** @typedef {import("./culling.js").Runs} Runs */
+/** @typedef {"moving" | "plain" | number} Kind with or without averaged edges, or the number of a frame at rest */
+
+const TURNS = 64, // of interleaved samples
+  REST = 64, // frames, after which a picture at rest is done: as many turns have interleaved samples
+  SMOOTH_MS = 50, // a frame that takes longer has no averaged edges
+  REFINED_MS = 250; // and one that takes longer is not refined at rest
+
+/** The inverse of a number's digits. @param {number} n @param {number} base */
+function radicalInverse(n, base) {
+  let found = 0;
+  for (let digit = 1 / base; n > 0; n = Math.floor(n / base), digit /= base) found += (n % base) * digit;
+  return found;
+}
+
+/** Commands in order: panes from the farthest to the nearest. @param {any[]} commands @param {number[]} eye @returns {any[]} */
+function sorted(commands, eye) {
+  const first = commands.findIndex(([name]) => name === "pane");
+  if (first < 0) return commands;
+  /** @type {{awayM: number, commands: any[]}[]} */
+  const panes = [];
+  for (const one of commands.slice(first)) {
+    if (one[0] === "pane") {
+      const awayM = Math.hypot(...one.slice(1).map((/** @type {number} */ x, /** @type {number} */ i) => x - eye[i]));
+      panes.push({ awayM, commands: [] });
+    } else panes[panes.length - 1].commands.push(one);
+  }
+  panes.sort((a, b) => b.awayM - a.awayM);
+  return [...commands.slice(0, first), ...panes.flatMap((pane) => pane.commands)];
+}
 
 /** The frame of a manifest. `open` makes one. */
 export class Frame {
@@ -16,30 +51,44 @@ export class Frame {
     this.context = context;
     const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC;
     context.configure({ device, format: "rgba8unorm", alphaMode: "opaque", usage });
-    this.bytes = new Uint8Array(manifest.frame.bytes);
     this.objects = new Objects(manifest, device);
     this.width = this.height = this.asked = 0;
     this.exposureEv = manifest.exposureEv;
     this.viewTransform = manifest.viewTransform;
-    /** @type {any[]} */
-    this.passes = [];
+    this.state = 0;
+    this.clusters = new Clusters(new Uint32Array(0), new Float32Array(0));
+    /** @type {Float32Array[]} of reflectors' triangles */
+    this.corners = [];
+    this.fastestMs = Infinity;
+    this.rest = 0; // frames that the picture at rest is the mean of
+    this.shown = ""; // what it shows
     this.finer = () => {}; // called when a state can be drawn, and when finer content has arrived
   }
 
-  /** @param {any} manifest @param {GPUDevice} device @param {HTMLCanvasElement} canvas @param {import("./loading.js").Data} data @param {number} number of the state @param {(frame: Frame) => void} finer */
+  /** @param {any} manifest @param {GPUDevice} device @param {HTMLCanvasElement} canvas @param {Data} data @param {number} number of the state @param {(frame: Frame) => void} finer */
   static async open(manifest, device, canvas, data, number = 0, finer = () => {}) {
     const frame = new Frame(manifest, device, canvas);
-    frame.finer = () => finer(frame);
+    const { clusters, mirrors } = manifest,
+      pieces = [clusters.places, clusters.sizes, ...mirrors.corners];
+    const [places, sizes, ...corners] = /** @type {ArrayBuffer[]} */ (
+      await Promise.all(pieces.map((piece) => data.read(piece)))
+    );
+    frame.clusters = new Clusters(new Uint32Array(places), new Float32Array(sizes));
+    frame.corners = corners.map((one) => new Float32Array(one));
+    frame.finer = () => {
+      frame.shown = "";
+      finer(frame);
+    };
     await frame.show(number, data);
     return frame;
   }
 
-  /** Show a state of the room: with stand-ins, once what it needs has arrived; then exactly. @param {number} number @param {import("./loading.js").Data} data */
+  /** Show a state of the room: with stand-ins, once what it needs has arrived; then exactly. @param {number} number @param {Data} data */
   async show(number, data) {
-    const { counts, changes, passes, finer } = this.manifest.states[number],
+    const { counts, changes, finer } = this.manifest.states[number],
       wanted = ++this.asked;
     if (!(await this.objects.show(counts, changes, data, () => wanted === this.asked))) return;
-    this.passes = passes;
+    [this.state, this.shown] = [number, ""];
     if (this.width) this.objects.fit(this.width, this.height);
     this.finer();
     await this.objects.refine(finer, data, this.finer);
@@ -49,51 +98,142 @@ export class Frame {
   resize(width, height) {
     if (width === this.width && height === this.height) return;
     [this.canvas.width, this.canvas.height] = [width, height];
-    [this.width, this.height] = [width, height];
+    [this.width, this.height, this.shown] = [width, height, ""];
     this.objects.fit(width, height);
   }
 
-  /**
-   * Draw into the canvas, or into a texture of its size and format.
-   * @param {import("./camera.js").Camera} camera @param {GPUTexture} target
-   */
-  draw(camera, target = this.context.getCurrentTexture()) {
-    const { manifest, device, exposureEv } = this,
-      { made } = this.objects,
-      { offsets, buffer, nearM } = manifest.frame;
-    const fields = { ...frameOf(camera, this.width, this.height, nearM), exposure: [2 ** exposureEv * manifest.unit] };
-    const record = new DataView(this.bytes.buffer);
-    for (const [name, values] of Object.entries(fields)) {
-      values.forEach((value, i) => record.setFloat32(offsets[name] + 4 * i, value, true));
-    }
-    record.setUint32(offsets.view_transform, this.viewTransform, true);
-    device.queue.writeBuffer(made.buffer[buffer], 0, this.bytes);
-    const encoder = device.createCommandEncoder(),
+  /** Show a camera on the canvas, better with each frame in which nothing changes; whether another one is better still. @param {Camera} camera */
+  async present(camera) {
+    const shows = JSON.stringify([camera, this.exposureEv, this.viewTransform]),
+      startedMs = performance.now();
+    const rests = shows === this.shown && this.fastestMs < REFINED_MS;
+    if (rests && this.rest === REST) return false;
+    this.rest = rests ? this.rest + 1 : 0;
+    this.draw(camera, this.context.getCurrentTexture(), rests ? this.rest - 1 : undefined);
+    this.shown = shows;
+    await this.device.queue.onSubmittedWorkDone().catch(() => undefined); // of a lost device, which comes back
+    this.fastestMs = Math.min(this.fastestMs, performance.now() - startedMs);
+    return this.fastestMs < REFINED_MS && this.rest < REST;
+  }
+
+  /** Draw into a texture of the canvas' size and format. @param {Camera} camera @param {GPUTexture} target @param {Kind} kind */
+  draw(camera, target, kind = this.fastestMs < SMOOTH_MS ? "moving" : "plain") {
+    const { manifest, device } = this,
+      views = this.views(camera, kind),
+      encoder = device.createCommandEncoder(),
       canvas = target.createView();
-    for (const one of this.passes) {
-      const depth = one.depthStencilAttachment;
-      const pass = encoder.beginRenderPass({
-        colorAttachments: one.colorAttachments.map((/** @type {any} */ a) => ({
-          ...a,
-          view: a.view === CANVAS ? canvas : made.view[a.view],
-        })),
-        ...(depth ? { depthStencilAttachment: { ...depth, view: made.view[depth.view] } } : {}),
-      });
-      for (const [name, first, second, third] of one.commands) {
-        if (name === "setPipeline") pass.setPipeline(made.render_pipeline[first]);
-        else if (name === "setBindGroup") pass.setBindGroup(first, made.bind_group[second]);
-        else if (name === "setVertexBuffer") pass.setVertexBuffer(first, made.buffer[second]);
-        else if (name === "setIndexBuffer") pass.setIndexBuffer(made.buffer[first], second);
-        else if (name === "drawIndexed") pass.drawIndexed(first, second, third);
-        else pass.draw(first);
+    /** @type {any[]} */
+    const passes = manifest.states[this.state].frames[typeof kind === "string" ? kind : kind % 2 ? "odd" : "even"].map(
+      (/** @type {number} */ at) => manifest.passes[at],
+    );
+    const encoded = new Set();
+    for (const one of passes) {
+      if (one.view === undefined) this.encode(encoder, one, canvas, views);
+      else if (!encoded.size) {
+        // passes of mirrored views, one view after the other
+        for (const view of views.mirrored) {
+          for (const each of passes) if (each.view === view.number) this.encode(encoder, each, canvas, views, view);
+        }
       }
-      pass.end();
+      if (one.view !== undefined) encoded.add(one.view);
     }
     device.queue.submit([encoder.finish()]);
   }
 
-  /** The picture of a camera, (height, width, 4) bytes. @param {import("./camera.js").Camera} camera */
-  async pixels(camera) {
+  /**
+   * Write the records of all cameras of a frame; returns what each sees, by the place of its record.
+   * @param {Camera} camera @param {Kind} kind
+   */
+  views(camera, kind) {
+    const { manifest, width, height } = this,
+      { buffer, bytes, offsets, nearM, places, weight } = manifest.frame,
+      { mirrors } = manifest;
+    const index = typeof kind === "number" ? kind : -1,
+      turn = index < 0 ? 0.5 : radicalInverse(index + 1, 2),
+      jitter = index < 0 ? [0, 0] : [turn - 0.5, radicalInverse(index + 1, 3) - 0.5];
+    const main = frameOf(camera, width, height, nearM, jitter);
+    const base = new Uint8Array(bytes);
+    const shown = { exposure: [2 ** this.exposureEv * manifest.unit] };
+    const fields = { ...main, eye: [...main.eye, Math.floor(turn * TURNS) % TURNS], ...shown };
+    new DataView(base.buffer).setUint32(offsets.view_transform, this.viewTransform, true);
+    this.record(buffer, base, offsets, fields);
+    if (index >= 0)
+      this.device.queue.writeBuffer(this.objects.made.buffer[weight], 0, new Float32Array([1 / (index + 1)]));
+    /** @type {Map<number, {clip: number[][], eye: import("./camera.js").Vector, visible: Uint8Array, seen: Runs, thin: Runs | null}>} */
+    const seen = new Map();
+    /** @param {number} at @param {number[][]} clip @param {import("./camera.js").Vector} eye */
+    const look = (at, clip, eye) => {
+      const visible = this.clusters.visible(clip);
+      seen.set(at, { clip, eye, visible, seen: this.clusters.runs(visible), thin: null });
+    };
+    look(buffer, main.rows, main.eye);
+    if (kind === "moving") {
+      for (const place of places) {
+        const { rows, clip_from_world, forward } = frameOf(camera, width, height, nearM, place.jitter);
+        this.record(place.buffer, base, offsets, { clip_from_world, forward });
+        look(place.buffer, rows, main.eye);
+      }
+    }
+    const { m } = manifest.states[this.state];
+    const mirrored = mirroredViews(mirrors.reflectors, this.corners, m, main, [width, height], mirrors.most);
+    for (const view of mirrored) {
+      const at = mirrors.buffers[view.number];
+      this.record(at.frame, base, offsets, view.frame);
+      this.record(at.view, new Uint8Array(mirrors.bytes), mirrors.offsets, view.view);
+      if (view.plan) this.record(at.plan, new Uint8Array(mirrors.planBytes), mirrors.planOffsets, view.plan);
+      look(at.frame, view.clip, view.frame.eye);
+    }
+    return { seen, mirrored };
+  }
+
+  /** Write a record: floats by the names of its fields. @param {number} at @param {Uint8Array<ArrayBuffer>} bytes as before, kept @param {Record<string, number>} offsets @param {Record<string, any>} fields */
+  record(at, bytes, offsets, fields) {
+    const record = new DataView(bytes.buffer);
+    for (const [name, values] of Object.entries(fields)) {
+      if (name === "rows") continue;
+      values.forEach((/** @type {number} */ value, /** @type {number} */ i) =>
+        record.setFloat32(offsets[name] + 4 * i, value, true),
+      );
+    }
+    this.device.queue.writeBuffer(this.objects.made.buffer[at], 0, bytes);
+  }
+
+  /** @param {GPUCommandEncoder} encoder @param {any} one pass @param {GPUTextureView} canvas @param {ReturnType<Frame["views"]>} views @param {import("./mirrors.js").View} [view] */
+  encode(encoder, one, canvas, views, view) {
+    const { made } = this.objects,
+      depth = one.depthStencilAttachment,
+      camera = views.seen.get(one.camera);
+    const pass = encoder.beginRenderPass({
+      colorAttachments: one.colorAttachments.map((/** @type {any} */ a) => ({
+        ...a,
+        view: a.view === CANVAS ? canvas : made.view[a.view],
+      })),
+      ...(depth ? { depthStencilAttachment: { ...depth, view: made.view[depth.view] } } : {}),
+    });
+    if (view && one.camera === this.manifest.mirrors.buffers[view.number].frame) {
+      pass.setScissorRect(view.rectangle[0], view.rectangle[1], view.rectangle[2], view.rectangle[3]);
+    }
+    for (const [name, first, second, third] of camera ? sorted(one.commands, camera.eye) : one.commands) {
+      if (name === "setPipeline") pass.setPipeline(made.render_pipeline[first]);
+      else if (name === "setBindGroup") pass.setBindGroup(first, made.bind_group[second]);
+      else if (name === "setVertexBuffer") pass.setVertexBuffer(first, made.buffer[second]);
+      else if (name === "setIndexBuffer") pass.setIndexBuffer(made.buffer[first], second);
+      else if (name === "draw") pass.draw(first);
+      else if (name === "onlyUpright") {
+        if (!view?.upright) break;
+      } else if (camera) {
+        if (name === "drawThin") {
+          camera.thin ??= this.clusters.runs(this.clusters.thin(camera.clip, this.height, camera.visible));
+        }
+        const runs = name === "drawThin" ? /** @type {Runs} */ (camera.thin) : camera.seen;
+        for (const [face, count] of within(runs, third / 3, first / 3)) pass.drawIndexed(3 * count, 1, 3 * face);
+      }
+    }
+    pass.end();
+  }
+
+  /** The picture of a camera, (height, width, 4) bytes: at rest, if there is time. @param {Camera} camera @param {Kind[]} kinds of frames, one after the other */
+  async pixels(camera, ...kinds) {
     const { device, width, height } = this,
       row = Math.ceil((4 * width) / 256) * 256;
     const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC;
@@ -102,7 +242,9 @@ export class Frame {
       size: row * height,
       usage: GPUBufferUsage.COPY_DST | GPUBufferUsage.MAP_READ,
     });
-    this.draw(camera, target);
+    if (!kinds.length) kinds = this.fastestMs < REFINED_MS ? [...Array(REST).keys()] : ["plain"];
+    for (const kind of kinds) this.draw(camera, target, kind);
+    this.shown = ""; // means are of this picture now
     const encoder = device.createCommandEncoder();
     encoder.copyTextureToBuffer({ texture: target }, { buffer, bytesPerRow: row }, [width, height]);
     device.queue.submit([encoder.finish()]);

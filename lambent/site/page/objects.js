@@ -1,11 +1,13 @@
 // The objects of WebGPU that a manifest describes, and their contents.
 
 import { enlarged, readText } from "./loading.js";
+import { wholeWindow } from "./mirrors.js";
 
 /** @typedef {import("./loading.js").Data} Data */
 
 export const CANVAS = "canvas";
 const AT_ONCE = 4; // files on their way: enough to fill a line, so few that the first is there first
+const MIRROR = "mirror"; // size of the buffers of mirrored views
 const WORDS = ["rgb10a2unorm", "rgb9e5ufloat", "depth32float"]; // of 4 bytes a texel
 
 /** Bytes of a block, and its texels a side. @param {string} format @returns {[number, number]} */
@@ -76,7 +78,7 @@ export class Objects {
     const add = (kind, found) => (made[kind] = [...(made[kind] ?? []), ...found]);
     const [modules, buffers, textures] = await Promise.all([
       Promise.all(lacking("shader_module").map((one) => readText(one.file))),
-      Promise.all(lacking("buffer").map((one) => data.read(one.data))),
+      Promise.all(lacking("buffer").map((one) => (one.data ? data.read(one.data) : null))),
       Promise.all(lacking("texture").map((one) => (one.data ? data.read(one.data.standin ?? one.data) : null))),
     ]);
     add(
@@ -91,7 +93,7 @@ export class Objects {
         first = made[kind]?.length ?? 0;
       add(
         kind,
-        ones.map((one) => (one.data ? this.create(kind, one) : null)),
+        ones.map((one) => (one.data || kind === "buffer" ? this.create(kind, one) : null)),
       );
       contents.forEach((content, i) => content && this.begin(kind, first + i, content));
     }
@@ -250,11 +252,12 @@ export class Objects {
       tables = this.manifest.tables;
     const isOther = width !== this.width || height !== this.height;
     [this.width, this.height] = [width, height];
+    const { wide } = wholeWindow([width, height]);
     tables.texture.slice(0, counts.texture).forEach((/** @type {any} */ one, /** @type {number} */ at) => {
       if (one.data || (made.texture[at] && !isOther)) return;
       made.texture[at]?.destroy();
       const size = one.size.map((/** @type {any} */ n, /** @type {number} */ i) =>
-        n === CANVAS ? [width, height][i] : n,
+        n === CANVAS ? [width, height][i] : n === MIRROR ? wide[i] : n,
       );
       made.texture[at] = device.createTexture({ ...one, size });
     });

@@ -77,7 +77,7 @@ export class Visit extends EventTarget {
     this.advance(Math.max(0, ms - this.lastMs) / 1e3);
     this.lastMs = ms;
     Object.assign(frame, { exposureEv: this.exposureEv, viewTransform: this.viewTransform });
-    frame.draw(this.camera);
+    frame.present(this.camera).then((isBetter) => isBetter && this.touch());
     document.body.dataset.frames = String(++this.frames);
     document.body.dataset.camera = cameraAddress(this.camera);
     this.dispatchEvent(new Event("shown"));

@@ -1,0 +1,185 @@
+// Mirrored views of planar reflectors: lambent/realtime/planar/{planar_view,reflector_faces}.py in JavaScript. A view's
+// buffer shows the whole frame; what of it a camera needs is a rectangle, not a smaller buffer.
+
+/** @typedef {import("./camera.js").Vector} Vector */
+/** @typedef {ReturnType<typeof import("./camera.js").frameOf>} FrameFields */
+/** @typedef {{plane: number[], outline: Vector[], twoSided: boolean, deviationM: number, plan: any}} Reflector */
+/** @typedef {{number: number, upright: boolean, frame: any, view: any, plan: any, clip: number[][], rectangle: number[]}} View */
+
+const MARGIN_PX = 16,
+  MOST_MARGIN = 0.1,
+  STEP_PX = 64,
+  MOST_LEVELS = 7,
+  LEAST_PX = 2 << MOST_LEVELS;
+const CLEARANCE = 1e-5,
+  LEAST_SHARE = 2e-4,
+  LEAST_W = 1e-6;
+const SIDES = [
+  [0, 0, 1],
+  [1, 0, 1],
+  [-1, 0, 1],
+  [0, 1, 1],
+  [0, -1, 1],
+];
+
+/** @param {ArrayLike<number>} a @param {ArrayLike<number>} b */
+const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+/** @param {Vector} a @param {Vector} b @param {number} s @returns {Vector} a + s b */
+const along = (a, b, s) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
+
+/** Size of a buffer for a frame, and the frame's first pixel in it. @param {number[]} size */
+export function wholeWindow(size) {
+  const margin = Math.max(MARGIN_PX, Math.floor(MOST_MARGIN * Math.max(...size)));
+  const wide = size.map((length) => Math.max(Math.ceil((length + 2 * margin) / STEP_PX) * STEP_PX, LEAST_PX));
+  return { wide, offset: wide.map((length, i) => Math.floor((length - size[i]) / 2)) };
+}
+
+/** The part of a polygon in a frame, (x, y, w). @param {ArrayLike<number>} points three a corner @param {number} first @param {number} count @param {number[][]} clip */
+function onScreen(points, first, count, clip) {
+  /** @type {number[][]} */
+  let polygon = [];
+  for (let i = first; i < first + count; i++) {
+    const p = [points[3 * i], points[3 * i + 1], points[3 * i + 2]];
+    polygon.push([0, 1, 3].map((row) => dot(clip[row], p) + clip[row][3]));
+  }
+  for (const side of SIDES) {
+    const heights = polygon.map((p) => dot(side, p) - (side === SIDES[0] ? LEAST_W : 0));
+    if (heights.every((height) => height > 0)) continue;
+    const kept = [];
+    for (let i = 0; i < polygon.length; i++) {
+      const j = (i + 1) % polygon.length;
+      if (heights[i] > 0) kept.push(polygon[i]);
+      if (heights[i] > 0 !== heights[j] > 0) {
+        const s = heights[i] / (heights[i] - heights[j]);
+        kept.push(polygon[i].map((value, k) => value + s * (polygon[j][k] - value)));
+      }
+    }
+    polygon = kept;
+    if (polygon.length < 3) return [];
+  }
+  return polygon.map(([x, y, w]) => [x / w, y / w]);
+}
+
+/** Share of the frame. @param {number[][]} polygon */
+function area(polygon) {
+  let sum = 0;
+  polygon.forEach(([x, y], i) => {
+    const [nextX, nextY] = polygon[(i + 1) % polygon.length];
+    sum += x * nextY - y * nextX;
+  });
+  return Math.abs(sum) / 8; // half, of the 2 x 2 square
+}
+
+/** Share of a frame that a reflector's triangles cover. @param {Float32Array} corners @param {number[][]} clip */
+export function shareOf(corners, clip) {
+  let sum = 0;
+  for (let i = 0; i < corners.length / 3; i += 3) sum += area(onScreen(corners, i, 3, clip));
+  return sum;
+}
+
+/** @param {Reflector} one @param {Vector} eye */
+const clearanceM = (one, eye) => CLEARANCE * Math.max(...one.outline.flat().map(Math.abs), ...eye.map(Math.abs));
+
+/**
+ * The views that a frame needs, the largest first.
+ * @param {Reflector[]} reflectors @param {Float32Array[]} corners of their triangles @param {Record<string, number>} widest
+ * m, by the numbers of the reflectors that the state mirrors @param {FrameFields} frame @param {number[]} size @param {number} most
+ * @returns {View[]}
+ */
+export function mirroredViews(reflectors, corners, widest, frame, size, most) {
+  const seen = Object.entries(widest).flatMap(([of, m], number) => {
+    const one = reflectors[Number(of)],
+      share = shareOf(corners[Number(of)], frame.rows);
+    if (share < LEAST_SHARE) return [];
+    let plane = one.plane,
+      above = dot(plane, frame.eye) + plane[3];
+    if (above < 0 && one.twoSided) [plane, above] = [plane.map((value) => -value), -above];
+    return above > 2 * clearanceM(one, frame.eye) ? [{ share, number, one, plane, m }] : [];
+  });
+  seen.sort((a, b) => b.share - a.share);
+  return seen.slice(0, most).flatMap(({ number, one, plane, m }, order) => {
+    const view = viewOf(one, plane, frame, size, order);
+    return view ? [{ ...view, number, rectangle: rectangleOf(one, m, frame, size) }] : [];
+  });
+}
+
+/** @param {Reflector} one @param {number[]} plane towards the viewer @param {FrameFields} frame @param {number[]} size @param {number} order */
+export function viewOf(one, plane, frame, size, order) {
+  const n = /** @type {Vector} */ (plane.slice(0, 3)),
+    d = plane[3],
+    { wide, offset } = wholeWindow(size);
+  /** @param {Vector} v @returns {Vector} */
+  const turned = (v) => along(v, n, -2 * dot(n, v));
+  const scale = [0, 1].map((i) => size[i] / wide[i]),
+    shift = [0, 1].map((i) => (size[i] + 2 * offset[i] - wide[i]) / wide[i]);
+  const clip = frame.rows.map((row) => [...turned(/** @type {any} */ (row)), row[3] - 2 * d * dot(row, n)]);
+  clip[0] = clip[0].map((value, i) => scale[0] * value + shift[0] * clip[3][i]);
+  clip[1] = clip[1].map((value, i) => scale[1] * value - shift[1] * clip[3][i]);
+  const eye = along(turned(frame.eye), n, -2 * d),
+    across = /** @type {Vector} */ (turned(frame.across).map((value) => value / scale[0])),
+    up = /** @type {Vector} */ (turned(frame.up).map((value) => value / scale[1]));
+  const forward = along(along(turned(frame.forward), across, -shift[0]), up, shift[1]);
+  const steepest = dot(forward, n) + Math.abs(dot(across, n)) + Math.abs(dot(up, n));
+  if (steepest <= 0) return null;
+  const clearance = clearanceM(one, frame.eye),
+    near = [...n, d - one.deviationM - clearance];
+  clip[2] = clip[3].map((value, i) => value - (0.999 / steepest) * near[i]);
+  const upright = dot(n, one.plane) > 0;
+  return {
+    upright,
+    clip,
+    frame: {
+      clip_from_world: [0, 1, 2, 3].flatMap((column) => clip.map((row) => row[column])),
+      eye,
+      across: [...across, n[0]],
+      up: [...up, n[1]],
+      forward: [...forward, n[2]],
+      show: [1, 1, 1, 0],
+    },
+    view: {
+      eye,
+      row_x: clip[0].slice(0, 3),
+      row_y: clip[1].slice(0, 3),
+      row_w: clip[3].slice(0, 3),
+      plane,
+      size: wide,
+      offset,
+      tolerance: [one.deviationM + 2 * clearance],
+      focal_px: [wide[1] / 2 / Math.hypot(...up)],
+      levels: [MOST_LEVELS],
+      number: [order],
+    },
+    plan: upright && one.plan ? planOf(one.plan, plane, eye) : null,
+  };
+}
+
+/** @param {any} plan @param {number[]} plane @param {Vector} eye */
+function planOf(plan, plane, eye) {
+  const from = along(eye, plan.corner, -1);
+  /** @param {Vector} axis @param {number} cells */
+  const row = (axis, cells) => [
+    ...axis.map((value) => value / (plan.cellM * cells)),
+    (dot(from, axis) / plan.cellM + 0.5) / cells,
+  ];
+  return {
+    to_u: row(plan.across, plan.columns),
+    to_v: row(plan.along, plan.rows),
+    below: [-(dot(plane, eye) + plane[3])],
+  };
+}
+
+/** What of a view's buffer its reflector needs: x, y, width, height. @param {Reflector} one @param {number} m of its widest lobe @param {FrameFields} frame @param {number[]} size */
+function rectangleOf(one, m, frame, size) {
+  const { wide, offset } = wholeWindow(size),
+    reach = Math.max(MARGIN_PX, Math.floor((m * size[1]) / Math.hypot(...frame.up)));
+  const shown = onScreen(one.outline.flat(), 0, one.outline.length, frame.rows);
+  const places = shown.map(([x, y]) => [((x + 1) / 2) * size[0] + offset[0], ((1 - y) / 2) * size[1] + offset[1]]);
+  if (!places.length) return [0, 0, ...wide];
+  const ends = [0, 1].map((i) => {
+    const along = places.map((place) => place[i]);
+    return [Math.floor(Math.min(...along) - reach), Math.ceil(Math.max(...along) + reach)].map((px) =>
+      Math.min(Math.max(px, 0), wide[i]),
+    );
+  });
+  return [ends[0][0], ends[1][0], ends[0][1] - ends[0][0], ends[1][1] - ends[1][0]];
+}
