@@ -36,7 +36,7 @@ def things(
         key = look.material.model_dump_json() + repr(look.textures)
         if key not in numbers:
             numbers[key] = len(finishes)
-            finishes.append({"name": look.material.name, "facts": _facts(look, textured)})
+            finishes.append({"name": look.material.name, "facts": facts_of(look, textured)})
         return numbers[key]
 
     used = list(dict.fromkeys(one.material for one in objects))
@@ -58,7 +58,7 @@ def things(
     }  # fmt: skip
 
 
-def _facts(look: Look, textured: str) -> Facts:
+def facts_of(look: Look, textured: str) -> Facts:
     """Where the numbers of a finish come from, as far as its document says, and its texture, if not its own."""
     facts = _source(look.material.provenance or Provenance())
     if isinstance(look.textures, ImageTexture):

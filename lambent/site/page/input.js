@@ -36,9 +36,10 @@ export function follow(visit) {
   );
 }
 
-/** Any input stops a walk that is played, but the buttons of walks, which do it themselves. @param {Visit} visit @param {Event} event */
-function halt(visit, { target }) {
-  if (!(target instanceof Element && target.closest("#walks"))) visit.stop();
+/** Any input stops a walk, but for presses of its own button, which does. @param {Visit} visit @param {Event} event */
+function halt(visit, event) {
+  const isPress = !(event instanceof KeyboardEvent) || event.key === "Enter" || event.key === " ";
+  if (!isPress || !(event.target instanceof Element && event.target.closest("#walks"))) visit.stop();
 }
 
 /** One finger or the mouse looks or orbits, two fingers walk or zoom; a click picks. */

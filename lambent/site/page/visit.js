@@ -2,6 +2,7 @@
 
 import { addressOf, cameraAddress, readAddress } from "./address.js";
 import * as c from "./camera.js";
+import { tellRest } from "./messages.js";
 import { glide, isFloor, standingAt, turned } from "./moves.js";
 
 /** @typedef {c.Camera} Camera */
@@ -205,6 +206,7 @@ export class Visit extends EventTarget {
     this.state = number;
     this.changed();
     if (this.frame && this.data) await this.frame.show(number, this.data);
+    tellRest("");
     document.body.dataset.state = this.manifest.states[number].name;
     this.touch();
   }
