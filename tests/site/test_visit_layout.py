@@ -60,7 +60,7 @@ def test_many_and_long_names_fit(chromium, box_site, width, height):
     with chromium(flags=("--no-sandbox", "--disable-features=WebGPU")) as page, served(box_site) as address:
         page.set_viewport_size({"width": width, "height": height})
         page.goto(address)
-        page.wait_for_selector("#message:has-text('no WebGPU')")
+        page.wait_for_selector("#message:has-text('WebGPU')")
         page.evaluate(FILL, LONG)
         panel, card = page.evaluate(BOXES)
         for box in (panel, card):
