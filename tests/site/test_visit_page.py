@@ -67,11 +67,11 @@ def camera_of(page):
     return np.array([float(x) for x in page.get_attribute("body", "data-camera").split(",")])
 
 
-def next_frame(page, act):
-    """Do something, and wait for the frame that follows."""
-    frames = page.get_attribute("body", "data-frames")
+def moved(page, act):
+    """Do something, and wait until the camera has moved."""
+    before = page.get_attribute("body", "data-camera")
     act()
-    page.wait_for_selector(f"body:not([data-frames='{frames}'])", state="attached")
+    page.wait_for_selector(f"body:not([data-camera='{before}'])", state="attached")
 
 
 def opened(page, address):
@@ -103,9 +103,8 @@ def test_things_by_mouse_and_keys(chromium, site, hit):
         page.focus("#picture")
         page.keyboard.press("o")
         assert page.get_attribute("#orbit", "aria-pressed") == "true"
-        next_frame(page, lambda: page.keyboard.press("d"))
         page.mouse.move(160, 120)
-        next_frame(page, lambda: page.mouse.wheel(0, -200))
+        moved(page, lambda: page.mouse.wheel(0, -200))
         arms = [np.linalg.norm(one[:3] - place) for one in (first, camera_of(page))]
         assert arms[1] < 0.95 * arms[0], "the wheel draws nearer to the clicked place of the large wall"
         page.keyboard.press("Escape")
@@ -135,7 +134,7 @@ def test_walks_links_and_pictures(chromium, device, store, site):
     with chromium() as page, served(site) as address:
         faults = opened(page, address)
         context, walk = page.context, page.locator("#walks button >> text=pass")
-        next_frame(page, walk.click)
+        moved(page, walk.click)
         assert walk.get_attribute("aria-pressed") == "true"
         page.keyboard.press("Shift")
         assert walk.get_attribute("aria-pressed") == "false", "any input stops it"
@@ -150,7 +149,7 @@ def test_walks_links_and_pictures(chromium, device, store, site):
         for _ in range(4):
             page.keyboard.press("ArrowRight")
         assert page.inner_text("#ev") == "+1 1/3 EV"
-        next_frame(page, lambda: page.select_option("#transform", "neutral"))
+        page.select_option("#transform", "neutral")
         context.grant_permissions(["clipboard-read", "clipboard-write"], origin=address)
         page.click("#share")
         page.wait_for_selector("#share >> text=Link copied")
@@ -195,7 +194,7 @@ def test_by_fingers(chromium, site, hit):
         assert np.array_equal(camera_of(page), first), "a tap on a thing shows its card alone"
         page.click("#close")
         page.click("#name")
-        next_frame(page, lambda: page.touchscreen.tap(*FLOOR))
+        moved(page, lambda: page.touchscreen.tap(*FLOOR))
         there = camera_of(page)
         np.testing.assert_allclose(there[[0, 2]], hit(*FLOOR)[1][[0, 2]], atol=0.02)
         ahead = [(one[3:6] - one[:3]) / np.linalg.norm(one[3:6] - one[:3]) for one in (first, there)]
@@ -210,7 +209,7 @@ def test_by_fingers(chromium, site, hit):
             session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
 
         fingers("touchStart", (140, 120), (180, 120))
-        next_frame(page, lambda: fingers("touchMove", (100, 120), (220, 120)))
+        moved(page, lambda: fingers("touchMove", (100, 120), (220, 120)))
         fingers("touchEnd")
         assert not np.array_equal(camera_of(page)[:3], pivot[:3]), "a pinch draws nearer"
         assert faults == []

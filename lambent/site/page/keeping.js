@@ -4,26 +4,35 @@ import { say } from "./messages.js";
 
 /** @typedef {import("./visit.js").Visit} Visit */
 
+const COPIED = "Link copied";
 const LONGEST_BYTES = 240; // of a file's name without its ending; file systems take 255
 
 /** Put what is seen into the address, and copy that. @param {Visit} visit */
 export async function share(visit) {
-  const button = /** @type {HTMLElement} */ (document.getElementById("share"));
-  history.replaceState(null, "", `#${visit.address()}`);
+  const button = /** @type {HTMLElement} */ (document.getElementById("share")),
+    address = visit.address(),
+    text = button.textContent;
+  history.replaceState(null, "", `#${address}`);
   try {
     await navigator.clipboard.writeText(location.href);
   } catch {
     return say(location.href, true); // refused, or not on a secure address: to be copied by hand
   }
-  const text = button.textContent;
-  button.textContent = "Link copied";
-  say("Link copied");
-  visit.addEventListener("shown", () => (button.textContent = text), { once: true });
+  say(COPIED);
+  if (text === COPIED) return;
+  button.textContent = COPIED;
+  const forget = () => {
+    if (visit.address() === address) return;
+    button.textContent = text;
+    visit.removeEventListener("shown", forget);
+  };
+  visit.addEventListener("shown", forget);
 }
 
 /** Download the picture. @param {Visit} visit */
 export async function keep(visit) {
-  const { frame, camera, manifest } = visit;
+  const { camera, manifest } = visit,
+    frame = visit.exposed();
   if (!frame) return;
   const { width, height } = frame,
     pixels = await frame.pixels(camera);

@@ -70,18 +70,24 @@ export class Visit extends EventTarget {
   /** @param {number} ms */
   show(ms) {
     this.requested = false;
-    const { canvas, frame } = this,
+    const { canvas } = this,
+      frame = this.exposed(),
       ratio = window.devicePixelRatio || 1;
     if (!frame) return;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((n) => Math.max(1, Math.round(n * ratio)));
     frame.resize(width, height);
     this.advance(Math.max(0, ms - this.lastMs) / 1e3);
     this.lastMs = ms;
-    Object.assign(frame, { exposureEv: this.exposureEv, viewTransform: this.viewTransform });
     frame.present(this.camera).then((isBetter) => isBetter && this.touch());
     document.body.dataset.frames = String(++this.frames);
     document.body.dataset.camera = cameraAddress(this.camera);
     this.dispatchEvent(new Event("shown"));
+  }
+
+  /** The frame, with the visitor's exposure and view transform. */
+  exposed() {
+    const { frame, exposureEv, viewTransform } = this;
+    return frame && Object.assign(frame, { exposureEv, viewTransform });
   }
 
   /** @param {number} dtS */
