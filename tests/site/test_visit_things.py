@@ -11,6 +11,7 @@ from lambent.materials.document import Material, Provenance
 from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import ImageTexture, Look
 from lambent.site.things import facts_of
+from lambent.site.vertices import vertices_of
 from lambent.store.contract import scene_record, whole_objects
 from lambent.store.store import Store
 from tests.scenes.loaders.gltf.test_gltf import document, loaded
@@ -51,13 +52,13 @@ def test_the_copyright_of_a_gltf_file_is_the_credit_of_a_scene_that_has_none(tmp
 def test_the_manifest_has_the_triangles_and_the_finishes_of_every_thing(blue_box, box_site):
     store, manifest = Store.open(blue_box), manifest_of(box_site)
     visit, buffers = manifest["visit"], manifest["tables"]["buffer"]
-    vertices, indices = (
-        np.frombuffer(unpacked(box_site, buffers[visit["geometry"][name]]["data"]), kind)
-        for name, kind in (("vertices", np.float32), ("indices", np.uint32))
-    )
-    positions = vertices.reshape(-1, visit["geometry"]["stride"])[:, :3]
-    assert np.array_equal(positions, store.read("geometry/positions"))
-    assert np.array_equal(indices.reshape(-1, 3), store.read("geometry/faces"))
+    data, indices = (buffers[visit["geometry"][name]]["data"] for name in ("vertices", "indices"))
+    words = np.frombuffer(unpacked(box_site, data), np.uint32).reshape(-1, data["packing"]["channels"])
+    vertices = vertices_of(words)
+    assert vertices.shape[1] == visit["geometry"]["stride"]
+    assert np.array_equal(vertices[:, :3], store.read("geometry/positions"))
+    faces = np.frombuffer(unpacked(box_site, indices), np.uint32).reshape(-1, 3)
+    assert np.array_equal(faces, store.read("geometry/faces"))
     wanted = whole_objects(scene_record(store).objects)
     found = [(one["name"], one["material"], one["first"], one["count"]) for one in visit["objects"]]
     assert found == [(one.name, one.material, one.first_face, one.face_count) for one in wanted]
