@@ -37,4 +37,7 @@ def command(
     wanted = None if size is None else parse_size(size)
     made = export(store, output, as_=as_, size=wanted, views=view or (), note=note, progress=True)
     rows = [(as_, str(output)), ("to transfer", f"{made['bytes'] / 1e6:.1f} MB in {made['files']} files")]
+    if as_ == "site":
+        memory = f"{made['graphics_bytes'] / 1e6:.0f} MB of graphics, {made['script_bytes'] / 1e6:.0f} MB of JavaScript"
+        rows.append(("memory", memory))
     show(made, f"{table(rows)}\n\nto look at it: lambent serve {output}", json)

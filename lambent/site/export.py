@@ -30,6 +30,7 @@ from lambent.render.output import ignore
 from lambent.scenes.scene import Variant
 from lambent.site.cameras import cameras_of, frames_of, widest
 from lambent.site.manifest import Manifest, camel
+from lambent.site.memory import graphics_bytes, script_bytes
 from lambent.site.things import things
 from lambent.store.kept.states import lamps_of, variants_of
 from lambent.store.kept.views import read_views
@@ -44,7 +45,7 @@ DISPLAY, BAKED = "site", "as baked"
 
 
 def export(store: Store, folder: Path, progress: Progress = silent, note: Note = ignore) -> dict[str, Any]:
-    """Write a site of a baked scene; returns its figures: bytes, files, pipelines.
+    """Write a site of a baked scene; returns its figures: bytes, files, pipelines, memory.
 
     Parameters
     ----------
@@ -93,7 +94,8 @@ def export(store: Store, folder: Path, progress: Progress = silent, note: Note =
     _copy_page(folder)
     return {
         "written": folder, "bytes": sum(manifest.chunks.files.values()), "files": len(manifest.chunks.files),
-        "pipelines": len(manifest.tables["render_pipeline"]),
+        "pipelines": len(manifest.tables["render_pipeline"]), "graphics_bytes": graphics_bytes(manifest.tables),
+        "script_bytes": script_bytes(document, len(baked.faces)),
     }  # fmt: skip
 
 

@@ -35,7 +35,7 @@ def standin(format: str, size: tuple[int, int, int], levels: list[bytes]) -> tup
     if format == DEPTH:
         depths = np.frombuffer(levels[0], np.float32).reshape(layers, rows, columns)
         blocks = _blocks(depths[..., None], 1 << DEPTH_LEVEL)
-        return DEPTH_LEVEL, [blocks.max(axis=(2, 4)).tobytes()]  # the farthest: a surface never shades itself
+        return DEPTH_LEVEL, [blocks.min(axis=(2, 4)).tobytes()]  # farthest from the sun: no surface shades itself
     return None
 
 

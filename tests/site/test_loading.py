@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from lambent.realtime.light.baked import read_baked
+from lambent.realtime.planar.planar_view import whole_window
+from lambent.site.memory import graphics_bytes, script_bytes
 from lambent.site.standins import COARSE_LEVEL, DROPPED_BITS, standin
 from lambent.site.vertices import UNITS, vertices_of, words_of
 from lambent.store.store import Store
@@ -98,12 +100,12 @@ def test_blocks_of_a_light_map_are_means_of_its_charts(javascript):
     assert not found[1, ..., :3].any() and (found[..., 3] == 1).all()
 
 
-def test_depths_are_the_farthest_of_their_blocks(javascript):
+def test_depths_are_the_farthest_from_the_sun_in_their_blocks(javascript):
     depths = np.random.default_rng(5).uniform(0, 1, (2, 16, 16)).astype(np.float32)
     finest, coarse = standin("depth32float", (16, 16, 2), [depths.tobytes()])
     given = {"data": encoded(b"".join(coarse)), "size": (16, 16, 2), "levels": 1, "finest": finest, "bytes": 4}
     found = np.frombuffer(base64.b64decode(javascript(ENLARGED, given)), np.float32).reshape(depths.shape)
-    farthest = depths.reshape(2, 4, 4, 4, 4).max(axis=(2, 4))
+    farthest = depths.reshape(2, 4, 4, 4, 4).min(axis=(2, 4))
     assert np.array_equal(found, farthest.repeat(4, axis=1).repeat(4, axis=2))
 
 
@@ -132,3 +134,63 @@ def test_a_site_has_stand_ins_for_what_is_large(streamed_site, blue_box):
     words = np.frombuffer(unpacked(streamed_site, piece), np.uint32).reshape(-1, 11)
     positions = read_baked(Store.open(blue_box)).positions
     assert np.array_equal(np.unique(vertices_of(words)[:, :3], axis=0), np.unique(positions, axis=0))
+
+
+@pytest.mark.parametrize(
+    ("table", "one", "words"),
+    [
+        ("texture", {"size": [300, 9000, 1]}, "allows 8192 texels a side of a texture, the room has 9000: bake it at"),
+        ("texture", {"size": [8, 8, 300]}, "allows 256 layers of a texture, the room has 300"),
+        ("buffer", {"size": 3e8}, "allows 250000000 bytes of a buffer, the room has 300000000"),
+        ("texture", {"size": ["canvas", "canvas", 1]}, None),
+    ],
+)
+def test_what_an_adapter_does_not_allow_is_said(javascript, table, one, words):
+    tables = {"texture": [{"size": [64, 64]}], "buffer": [{"size": 80}]}
+    tables[table].append(one)
+    limits = {"maxTextureDimension2D": 8192, "maxTextureArrayLayers": 256, "maxBufferSize": 250_000_000}
+    found = javascript("import {beyond} from './device.js'; say(beyond(...given));", [tables, limits])
+    assert found is None if words is None else words in found
+
+
+def test_memory_is_that_of_the_objects(streamed_site):
+    """Against sizes of the contents, which are those of the tables; drawn textures follow the window."""
+    manifest = manifest_of(streamed_site)
+    tables = manifest["tables"]
+    sizes = [len(_content(streamed_site, one)) for one in tables["texture"] if "data" in one]
+    drawn = [one for one in tables["texture"] if "data" not in one]
+    (wide, high), _ = whole_window((1920, 1080))
+    texels = {"canvas": 1920 * 1080, "mirror": int(wide) * int(high)}
+    bytes_of = {
+        "depth32float": 4,
+        "rgb10a2unorm": 4,
+        "rgba8unorm": 4,
+        "rgba16float": 8,
+        "r32uint": 4,
+        "rgba32float": 16,
+        "r32float": 4,
+    }
+    wanted = sum(sizes) + sum(one["size"] for one in tables["buffer"])
+    for one in drawn:
+        levels = [texels[one["size"][0]]] if one["mipLevelCount"] == 1 else _level_texels(int(wide), int(high), one)
+        wanted += bytes_of[one["format"]] * sum(levels)
+    assert graphics_bytes(tables) == wanted
+    (blue,) = manifest["states"][1:]
+    changed = {piece["file"]: piece["bytes"] for places in blue["changes"].values() for piece in places.values()}
+    places = [tables[kind][int(at)]["data"] for kind, places in blue["changes"].items() for at in places]
+    changed |= {piece["file"]: piece["bytes"] for piece in places}
+    by_number = {kind: {int(at): piece for at, piece in places.items()} for kind, places in blue["changes"].items()}
+    document = {"tables": tables, "states": [{"changes": {}}, {"changes": by_number}]}
+    assert script_bytes(document, 10) == 360 + sum(changed.values())
+
+
+def _level_texels(width: int, height: int, one: dict) -> list[int]:
+    return [max(1, width >> level) * max(1, height >> level) for level in range(one["mipLevelCount"])]
+
+
+def _content(site, one):
+    """A texture's content, pictures as texels."""
+    if not one["data"].get("picture"):
+        return unpacked(site, one["data"])
+    levels = [(one["size"][0] >> k or 1) * (one["size"][1] >> k or 1) * 4 for k in range(one["mipLevelCount"])]
+    return bytes(sum(levels))

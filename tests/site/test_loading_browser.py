@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -85,3 +87,54 @@ def test_a_file_that_fails_after_the_first_picture_is_tried_again(chromium, stre
             page.wait_for_selector("#message:empty", state="attached")
         page.wait_for_selector("#rest:empty", state="attached")
         assert faults == [] and fails == {} and len(held) == 2
+
+
+HEAP_GROWTH, MEMORY_GROWTH = 0.5e6, 60e6  # bytes: of JavaScript, and of all processes, over all reloads
+RELOADS, SWITCHES, FIRST = 50, 20, 10  # caches of code and shaders fill during the first reloads
+
+
+def _memory(page) -> tuple[float, float]:
+    """Bytes that live in JavaScript after a collection, and of the browser's processes."""
+    client = page.context.new_cdp_session(page)
+    client.send("HeapProfiler.collectGarbage")
+    usage = client.send("Runtime.getHeapUsage")
+    client.detach()
+    processes = page.context.browser.new_browser_cdp_session().send("SystemInfo.getProcessInfo")["processInfo"]
+    pages = sum(int(Path(f"/proc/{one['id']}/statm").read_text().split()[1]) for one in processes)
+    return usage["usedSize"] + usage["backingStorageSize"], pages * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="this system has no /proc to read memory from")
+def test_reloads_and_states_leave_nothing_behind(chromium, streamed_site):
+    with chromium() as page, served(streamed_site) as address:
+        page.set_viewport_size({"width": 200, "height": 120})
+
+        def whole():
+            page.wait_for_selector("body[data-frames]", state="attached")
+            page.wait_for_selector("#rest:empty", state="attached")
+
+        def switch(name):
+            page.click(f"#states button >> text={name}")
+            page.wait_for_selector(f"body[data-state='{name}']", state="attached")
+
+        page.goto(address)
+        for _ in range(FIRST):
+            whole()
+            page.reload()
+        whole()
+        before = _memory(page)
+        for _ in range(RELOADS - FIRST):
+            page.reload()
+            whole()
+        after = _memory(page)
+        assert after[0] - before[0] < HEAP_GROWTH and after[1] - before[1] < MEMORY_GROWTH, (before, after)
+        for _ in range(2):
+            switch("blue")
+            switch("as baked")
+        before = _memory(page)
+        for _ in range(SWITCHES // 2):
+            switch("blue")
+            switch("as baked")
+        after = _memory(page)
+        assert after[0] - before[0] < HEAP_GROWTH and after[1] - before[1] < MEMORY_GROWTH, (before, after)

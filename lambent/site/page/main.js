@@ -40,10 +40,11 @@ async function open() {
   entitle(manifest);
   const device = await openDevice(manifest),
     here = visit ?? new Visit(manifest, canvas);
-  const data = new Data((done) => {
+  const report = (/** @type {number} */ done) => {
     const of = done > all ? "" : ` of ${(all / MB).toFixed(1)}`;
     (shown ? tellRest : tell)(`Loading ${(done / MB).toFixed(1)}${of} MB…`);
-  }, neededAgain(manifest));
+  };
+  const data = new Data(report, neededAgain(manifest));
   device.lost.then((info) => {
     if (info.reason === "destroyed") return;
     tell("The graphics device was lost; loading the room again…");
@@ -55,6 +56,7 @@ async function open() {
       if (frame === shown) return here.touch();
       shown = frame;
       tell("");
+      report(data.done);
       here.take(frame, data);
       if (!visit) begin(here);
     }),

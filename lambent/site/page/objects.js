@@ -81,51 +81,38 @@ export class Objects {
       Promise.all(lacking("buffer").map((one) => (one.data ? data.read(one.data) : null))),
       Promise.all(lacking("texture").map((one) => (one.data ? data.read(one.data.standin ?? one.data) : null))),
     ]);
-    add(
-      "shader_module",
-      modules.map((code) => device.createShaderModule({ code })),
-    );
-    for (const [kind, contents] of /** @type {[string, (ArrayBuffer | ImageBitmap | null)[]][]} */ ([
-      ["buffer", buffers],
-      ["texture", textures],
-    ])) {
-      const ones = lacking(kind),
-        first = made[kind]?.length ?? 0;
-      add(
-        kind,
-        ones.map((one) => (one.data || kind === "buffer" ? this.create(kind, one) : null)),
-      );
+    const shaders = modules.map((code) => device.createShaderModule({ code }));
+    add("shader_module", shaders);
+    for (const [kind, contents] of Object.entries({ buffer: buffers, texture: textures })) {
+      const first = made[kind]?.length ?? 0,
+        ones = lacking(kind).map((one) => (one.data || kind === "buffer" ? this.create(kind, one) : null));
+      add(kind, ones);
       contents.forEach((content, i) => content && this.begin(kind, first + i, content));
     }
-    add(
-      "sampler",
-      lacking("sampler").map((one) => device.createSampler(one)),
-    );
-    add(
-      "bind_group_layout",
-      lacking("bind_group_layout").map((one) => device.createBindGroupLayout(one)),
-    );
-    add(
-      "pipeline_layout",
-      lacking("pipeline_layout").map((one) =>
-        device.createPipelineLayout({
-          bindGroupLayouts: one.bindGroupLayouts.map((/** @type {number} */ at) => made.bind_group_layout[at]),
-        }),
-      ),
-    );
-    add(
-      "render_pipeline",
-      await Promise.all(
-        lacking("render_pipeline").map((one) =>
+    const inPlaces = (/** @type {any} */ one) => ({ ...one, module: made.shader_module[one.module] });
+    /** @type {[string, (one: any) => any][]} */
+    const makers = [
+      ["sampler", (one) => device.createSampler(one)],
+      ["bind_group_layout", (one) => device.createBindGroupLayout(one)],
+      [
+        "pipeline_layout",
+        ({ bindGroupLayouts: places }) =>
+          device.createPipelineLayout({
+            bindGroupLayouts: places.map((/** @type {number} */ at) => made.bind_group_layout[at]),
+          }),
+      ],
+      [
+        "render_pipeline",
+        ({ layout, vertex, fragment, ...one }) =>
           device.createRenderPipelineAsync({
             ...one,
-            layout: made.pipeline_layout[one.layout],
-            vertex: { ...one.vertex, module: made.shader_module[one.vertex.module] },
-            ...(one.fragment ? { fragment: { ...one.fragment, module: made.shader_module[one.fragment.module] } } : {}),
+            layout: made.pipeline_layout[layout],
+            vertex: inPlaces(vertex),
+            ...(fragment ? { fragment: inPlaces(fragment) } : {}),
           }),
-        ),
-      ),
-    );
+      ],
+    ];
+    for (const [kind, make] of makers) add(kind, await Promise.all(lacking(kind).map(make)));
     this.counts = counts;
   }
 
@@ -207,39 +194,24 @@ export class Objects {
   /** Depth cannot be written, only drawn. @param {GPUTexture} from @param {GPUTexture} to @param {number} layers */
   fillDepth(from, to, layers) {
     const device = this.device,
-      module = device.createShaderModule({ code: FILL_DEPTH });
-    const layout = device.createBindGroupLayout({
-      entries: [
-        {
-          binding: 0,
-          visibility: GPUShaderStage.FRAGMENT,
-          texture: { sampleType: "unfilterable-float", viewDimension: "2d-array" },
-        },
-      ],
-    });
-    const group = device.createBindGroup({
-      layout,
-      entries: [{ binding: 0, resource: from.createView({ dimension: "2d-array" }) }],
-    });
-    const encoder = device.createCommandEncoder();
+      module = device.createShaderModule({ code: FILL_DEPTH }),
+      encoder = device.createCommandEncoder();
+    const resource = from.createView({ dimension: "2d-array" });
     for (let layer = 0; layer < layers; layer++) {
       const pipeline = device.createRenderPipeline({
-        layout: device.createPipelineLayout({ bindGroupLayouts: [layout] }),
-        vertex: { module, entryPoint: "corner" },
-        fragment: { module, entryPoint: "fill", targets: [], constants: { LAYER: layer } },
+        layout: "auto",
+        vertex: { module },
+        fragment: { module, targets: [], constants: { LAYER: layer } },
         depthStencil: { format: "depth32float", depthWriteEnabled: true, depthCompare: "always" },
       });
+      const view = to.createView({ dimension: "2d", baseArrayLayer: layer, arrayLayerCount: 1 });
       const pass = encoder.beginRenderPass({
         colorAttachments: [],
-        depthStencilAttachment: {
-          view: to.createView({ dimension: "2d", baseArrayLayer: layer, arrayLayerCount: 1 }),
-          depthClearValue: 0,
-          depthLoadOp: "clear",
-          depthStoreOp: "store",
-        },
+        depthStencilAttachment: { view, depthClearValue: 0, depthLoadOp: "clear", depthStoreOp: "store" },
       });
+      const layout = pipeline.getBindGroupLayout(0);
       pass.setPipeline(pipeline);
-      pass.setBindGroup(0, group);
+      pass.setBindGroup(0, device.createBindGroup({ layout, entries: [{ binding: 0, resource }] }));
       pass.draw(3);
       pass.end();
     }
@@ -269,12 +241,7 @@ export class Objects {
         layout: made.bind_group_layout[one.layout],
         entries: one.entries.map((/** @type {any} */ { binding, buffer, view, sampler }) => ({
           binding,
-          resource:
-            buffer !== undefined
-              ? { buffer: made.buffer[buffer] }
-              : view !== undefined
-                ? made.view[view]
-                : made.sampler[sampler],
+          resource: made.view[view] ?? made.sampler[sampler] ?? { buffer: made.buffer[buffer] },
         })),
       }),
     );

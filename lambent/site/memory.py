@@ -1,0 +1,40 @@
+"""Memory that a site takes in a browser, by its manifest: on the graphics adapter, and in JavaScript."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from lambent.realtime.gpu.read_back import BLOCKS, texel
+from lambent.realtime.planar.planar_view import whole_window
+from lambent.site.manifest import CANVAS, MIRROR
+
+CANVAS_PX = 1920, 1080  # of the window that the figures are for
+FACE_BYTES = 36  # of a triangle's corners, which the page keeps for clicks and steps
+
+
+def graphics_bytes(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> int:
+    """Bytes of all buffers and textures; those that follow the window count as in one of `CANVAS_PX`."""
+    buffers = sum(int(one["size"]) for one in tables["buffer"])
+    return buffers + sum(map(_texture_bytes, tables["texture"]))
+
+
+def script_bytes(document: Mapping[str, Any], faces: int) -> int:
+    """Bytes that JavaScript keeps: corners of triangles, and contents in which states differ."""
+    kept: dict[str, int] = {}
+    for state in document["states"]:
+        for kind, places in state["changes"].items():
+            for at, piece in places.items():
+                for one in (piece, document["tables"][kind][at]["data"]):
+                    kept[one["file"]] = one["bytes"]
+    return faces * FACE_BYTES + sum(kept.values())
+
+
+def _texture_bytes(one: Mapping[str, Any]) -> int:
+    block, side = BLOCKS.get(one["format"]) or (math.prod(texel(one["format"])), 1)
+    following = {CANVAS: CANVAS_PX, MIRROR: [int(px) for px in whole_window(CANVAS_PX)[0]]}
+    sides = following.get(one["size"][0]) or one["size"][:2]
+    layers = one["size"][2] if len(one["size"]) > 2 else 1
+    levels = [[-(-max(1, n >> level) // side) for n in sides] for level in range(one.get("mipLevelCount") or 1)]
+    return block * layers * sum(math.prod(level) for level in levels)
