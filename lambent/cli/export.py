@@ -40,4 +40,6 @@ def command(
     if as_ == "site":
         memory = f"{made['graphics_bytes'] / 1e6:.0f} MB of graphics, {made['script_bytes'] / 1e6:.0f} MB of JavaScript"
         rows.append(("memory", memory))
+        of_groups = [f"{name} {size / 1e6:.1f} MB" for name, size in made["by_light_group"].items()]
+        rows += [("of these, by slider", ", ".join(of_groups))] if of_groups else []
     show(made, f"{table(rows)}\n\nto look at it: lambent serve {output}", json)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cache, cached_property, lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -64,13 +64,19 @@ class ObjectResources:
         self._has_shares, self.lamp = has_shares, lamp
         self.record, self.light, self._layouts, self._unit, self.beyond = record, light, layouts, unit, beyond
         self.emission = record.emission
-        self.group = cache(self._new_group)
+        self.groups: dict[tuple[Cube, LookUp], Any] = {}
 
     def relight(self, light: ProbeLight, emission: Triple) -> None:
         """Show the light of another probe, and the emission, W/(sr m^2)."""
         if light is not self.light or emission != self.emission:
             self.light, self.emission = light, emission
-            self.group.cache_clear()
+            self.groups = {}
+
+    def group(self, cube: Cube, look_up: LookUp) -> Any:
+        """Group 2 for draws that read a cube map by a look-up."""
+        if (cube, look_up) not in self.groups:
+            self.groups[cube, look_up] = self._new_group(cube, look_up)
+        return self.groups[cube, look_up]
 
     def _new_group(self, cube: Cube, look_up: LookUp) -> Any:
         """Group 2: cube map, resources of the look-up, and the table of the lamps taken out of a `cleaned` cube map.

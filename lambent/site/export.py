@@ -31,6 +31,7 @@ from lambent.scenes.scene import Variant
 from lambent.site.cameras import cameras_of, frames_of, widest
 from lambent.site.manifest import Manifest, camel
 from lambent.site.memory import graphics_bytes, script_bytes
+from lambent.site.mixing import mixing_of
 from lambent.site.things import things
 from lambent.store.kept.states import lamps_of, variants_of
 from lambent.store.kept.views import read_views
@@ -45,7 +46,7 @@ DISPLAY, BAKED = "site", "as baked"
 
 
 def export(store: Store, folder: Path, progress: Progress = silent, note: Note = ignore) -> dict[str, Any]:
-    """Write a site of a baked scene; returns its figures: bytes, files, pipelines, memory.
+    """Write a site of a baked scene; returns its figures: bytes, files, pipelines, memory, bytes by light group.
 
     Parameters
     ----------
@@ -76,11 +77,13 @@ def export(store: Store, folder: Path, progress: Progress = silent, note: Note =
     _write_poster(renderer, replace(state, exposure_ev=exposure_ev), folder / "poster.jpg")
     shown = renderer.target(DISPLAY, SIZE).create_view()
     manifest, states, rooms = Manifest(device, folder, SIZE, shown), [], list(_states(store, renderer, state, note))
-    of_cameras = cameras_of(renderer, manifest, state)
+    of_cameras, mixing = cameras_of(renderer, manifest, state), mixing_of(manifest, renderer, note)
     for room, now in tracked(rooms, progress, "states"):
         one = now()
         said = {"name": room.name or BAKED, "m": widest(renderer, one)}
         states.append({**said, **manifest.state(frames_of(renderer, one, shown))})
+        if mixing is not None:
+            states[-1]["mixing"] = mixing.state(room.light)
     document = {
         "format": FORMAT, "version": VERSION, "name": baked.record.name,
         "cameras": [camel(asdict(one)) for one in cameras],
@@ -89,6 +92,7 @@ def export(store: Store, folder: Path, progress: Progress = silent, note: Note =
         **of_cameras,
         "visit": things(store.folder, baked.record, renderer.resources, manifest, [room for room, _ in rooms]),
         "tables": manifest.tables, "passes": manifest.passes, "states": states,
+        **({} if mixing is None else mixing.said),
     }  # fmt: skip
     write_text(folder / "manifest.json", json.dumps(document, separators=(",", ":"), allow_nan=False))
     _copy_page(folder)
@@ -96,6 +100,7 @@ def export(store: Store, folder: Path, progress: Progress = silent, note: Note =
         "written": folder, "bytes": sum(manifest.chunks.files.values()), "files": len(manifest.chunks.files),
         "pipelines": len(manifest.tables["render_pipeline"]), "graphics_bytes": graphics_bytes(manifest.tables),
         "script_bytes": script_bytes(document, len(baked.faces)),
+        "by_light_group": mixing.bytes_of if mixing else {},
     }  # fmt: skip
 
 

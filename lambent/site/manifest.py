@@ -28,6 +28,7 @@ from lambent.site.vertices import UNITS, words_of
 
 VERTEX, INDEX = 0x20, 0x10  # usages of buffers
 FACES = 6  # of a cube
+COPY_SRC, STORAGE_BINDING = 0x1, 0x8  # of textures
 COLOURS = "rgba8unorm-srgb"  # of textures
 CANVAS = "canvas"  # stands for the texture that is shown, and for the size of textures that follow it
 MIRROR = "mirror"  # for the size of buffers of mirrored views (`whole_window`)
@@ -173,7 +174,7 @@ class Manifest:
         if found is None:
             return content
         finest, levels = found
-        piece = self._packed_texels(texture.format, texture.size[2], levels)
+        piece = self.packed_texels(texture.format, texture.size[2], levels)
         return {**content, "standin": {**piece, "finest": finest}}
 
     def _content(self, one: Any) -> dict[str, Any]:
@@ -198,9 +199,31 @@ class Manifest:
             return self.chunks.add(b"".join(levels))
         if texture.format == COLOURS and (picture := _picture(texture, levels)):
             return self.chunks.add_picture(picture)
-        return self._packed_texels(texture.format, texture.size[2], levels)
+        return self.packed_texels(texture.format, texture.size[2], levels)
 
-    def _packed_texels(self, format: str, layers: int, levels: list[bytes]) -> dict[str, Any]:
+    def place_of(self, one: Any) -> int | None:
+        """The place of an object that a frame uses; None of another."""
+        return self._places.get(id(one))
+
+    def resource(self, group: Any, binding: int) -> Any:
+        """The buffer, or the texture of the view, that a bind group has at a binding."""
+        found = self._device.made[id(group)].descriptor["entries"][binding]["resource"]
+        return found["buffer"] if isinstance(found, dict) else self.texture_of(found)
+
+    def texture_of(self, view: Any) -> Any:
+        """The texture of a view."""
+        return self._device.made[id(view)].descriptor["texture"]
+
+    def floats(self, buffer: Any, offset: int, count: int) -> NDArray[np.float32]:
+        """Numbers that a buffer holds at `offset` bytes."""
+        return np.frombuffer(buffer_bytes(self._device, buffer), np.float32, count, offset)
+
+    def let_mix(self, place: int) -> None:
+        """Let the page copy a texture, and write mixes into it."""
+        self.tables["texture"][place]["usage"] |= COPY_SRC | STORAGE_BINDING
+
+    def packed_texels(self, format: str, layers: int, levels: list[bytes]) -> dict[str, Any]:
+        """Where the MIP levels of a texture of this format and so many layers are."""
         word, channels = texel(format)
         runs = [(len(level) // word, len(level) // word // layers * FACES if layers > FACES else 0) for level in levels]
         return self.chunks.add(b"".join(levels), Packing(word, channels, runs))

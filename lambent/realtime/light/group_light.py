@@ -81,6 +81,15 @@ class GroupLight:
 
     def probe(self, name: str, factors: Floats) -> Probe | None:
         """The probe of an object without the sun's disc; None if the store does not have it by group."""
+        by_group = self.probe_by_group(name)
+        if by_group is None:
+            return None
+        probe, radiance = self.scene.probes[name], finite(mixed(by_group, factors))[0]
+        scaled = probe.irradiance and tuple(map(float, irradiance_of(radiance) * self.scene.unit))
+        return replace(probe, radiance=radiance, irradiance=scaled)
+
+    def probe_by_group(self, name: str) -> Floats | None:
+        """Radiance (n, 6, N, N, 3) of an object's probe by group without the sun's disc; None if the store has none."""
         by_group = self.groups.probe(name)
         if by_group is None:
             return None
@@ -90,9 +99,7 @@ class GroupLight:
                 bare = without_sun(replace(probe, irradiance=()), self.scene.sun, self.scene.unit)
                 self._discs[name] = np.asarray(finite(probe.radiance)[0] - finite(bare.radiance)[0])
             by_group[sun] = np.maximum(by_group[sun] - self._discs[name], 0)
-        radiance = finite(mixed(by_group, factors))[0]
-        scaled = probe.irradiance and tuple(map(float, irradiance_of(radiance) * self.scene.unit))
-        return replace(probe, radiance=radiance, irradiance=scaled)
+        return by_group
 
     def _of(self, member: str, factors: Floats) -> Floats:
         number = self.groups.number(member)

@@ -36,6 +36,13 @@ REST_S = 0.25  # after a change: until then the next is expected, as in a drag
 MAP = -1  # number of the light map among the parts; other numbers are probes
 
 
+def owners_of(scene: BakedScene) -> list[str | None]:
+    """By object of the record, the object that owns the light of its probe; None where the sky serves as probe."""
+    names = {id(probe.radiance): name for name, probe in scene.probes.items()}
+    found = (scene.probe_of(record) for record in scene.record.objects)
+    return [None if probe is None else names.get(id(probe.radiance)) for probe in found]
+
+
 class LightMixer:
     """Mixes a scene's light and shows the mix in its resources.
 
@@ -104,7 +111,7 @@ class LightMixer:
         """Mix these arrays from the next frame on: light that answers edited materials, or the scene's own again."""
         if self._wanted is None:
             self._wanted = groups.factors({})
-        self._answer, self._changed_s = replace(self._light, groups=groups), time.monotonic()
+        self._answer, self._changed_s = replace(self.baked, groups=groups), time.monotonic()
         self._answers += 1  # written last and read first by the thread, so that it never takes old light for new
 
     @property
@@ -122,17 +129,16 @@ class LightMixer:
         return ThreadPoolExecutor(1, "light")
 
     @cached_property
-    def _light(self) -> GroupLight:
+    def baked(self) -> GroupLight:
+        """The baked light by group: of sky, sun and emitters, which no edited material changes."""
         assert self._scene.groups is not None, "asked for with groups alone"
         return GroupLight(self._scene, self._scene.groups)
 
     @cached_property
     def _owners(self) -> dict[int, str | None]:
         """The object that owns each probe's light, by number; None where the sky serves as probe."""
-        names = {id(probe.radiance): name for name, probe in self._scene.probes.items()}
-        found = [self._scene.probe_of(record) for record in self._scene.record.objects]
-        keys = [0 if probe is None else id(probe.radiance) for probe in found]
-        return {number: names.get(keys[users[0]]) for number, users in enumerate(self._users)}
+        owners = owners_of(self._scene)
+        return {number: owners[users[0]] for number, users in enumerate(self._users)}
 
     @cached_property
     def _users(self) -> list[list[int]]:
@@ -178,32 +184,32 @@ class LightMixer:
         return self._answers.to_bytes(8) + factors.tobytes()
 
     @property
-    def _surfaces(self) -> GroupLight:
+    def surfaces(self) -> GroupLight:
         """Light of surfaces and probes: the answer to edited materials if there is one, else the baked light."""
-        return self._answer or self._light
+        return self._answer or self.baked
 
     def _map(self, factors: Floats) -> Any:
-        sides, before = self._surfaces.light_map(factors), self._sky_of
+        sides, before = self.surfaces.light_map(factors), self._sky_of
         lamps = None if self._scene.lamps is None else self._scene.lamps.in_map(factors)
-        if before is not None and not self._light.turns_sky(factors, before):
+        if before is not None and not self.baked.turns_sky(factors, before):
             return sides, lamps, (None, None)
-        self._sky_of, skies = factors, self._light.sky(factors)
+        self._sky_of, skies = factors, self.baked.sky(factors)
         return sides, lamps, tuple(None if sky is None else with_alpha(finite(sky)[0]) for sky in skies)
 
     def _probe(self, number: int, factors: Floats) -> ProbeLight | None:
         light, owner = self._resources.objects[self._users[number][0]].light, self._owners[number]
         if self.groups is self._scene.groups and (factors == 1).all():
             return light.as_baked
-        sky_change = self._light.sky_change(factors)
+        sky_change = self.baked.sky_change(factors)
         if owner is None:
-            sky = self._light.sky(factors)[1]
+            sky = self.baked.sky(factors)[1]
             return None if sky is None else light.relit(finite(sky)[0], (), sky_change)
-        probe = self._surfaces.probe(owner, factors)
+        probe = self.surfaces.probe(owner, factors)
         return None if probe is None else light.relit(probe.radiance, probe.irradiance, sky_change)
 
     def _show(self, part: int, factors: Floats, made: Any) -> None:
         """Upload a part."""
-        resources, light = self._resources, self._light
+        resources, light = self._resources, self.baked
         if part != MAP:
             for number in self._users[part] if made is not None else ():
                 item = resources.objects[number]

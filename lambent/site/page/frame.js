@@ -62,6 +62,8 @@ export class Frame {
     this.fastestMs = Infinity;
     this.rest = 0; // frames that the picture at rest is the mean of
     this.shown = ""; // what it shows
+    /** @type {(state: number) => void} called when another state is shown */
+    this.entered = () => {};
     this.finer = () => {}; // called when a state can be drawn, and when finer content has arrived
   }
 
@@ -90,6 +92,7 @@ export class Frame {
     if (!(await this.objects.show(counts, changes, data, () => wanted === this.asked))) return;
     [this.state, this.shown] = [number, ""];
     if (this.width) this.objects.fit(this.width, this.height);
+    this.entered(number);
     this.finer();
     await this.objects.refine(finer, data, this.finer);
   }

@@ -5,6 +5,7 @@ import { openPanel } from "./controls.js";
 import { openDevice } from "./device.js";
 import { Frame } from "./frame.js";
 import { follow } from "./input.js";
+import { offerLights } from "./lights.js";
 import { Data, neededAgain, readManifest } from "./loading.js";
 import { failed, forgive, tell, tellRest } from "./messages.js";
 import { readGeometry } from "./picking.js";
@@ -58,6 +59,7 @@ async function open() {
       tell("");
       report(data.done);
       here.take(frame, data);
+      offerLights(here);
       if (!visit) begin(here);
     }),
   ]);

@@ -44,6 +44,7 @@ export class Objects {
     this.coarse = new Set();
     /** @type {Promise<void>} one state's objects are made after another's */
     this.loaded = Promise.resolve();
+    this.leave = () => {}; // called before contents become another state's, to undo what else wrote into them
   }
 
   /**
@@ -64,6 +65,7 @@ export class Objects {
     }
     const contents = await Promise.all(differ.map(([, , piece]) => data.read(piece)));
     if (!isWanted()) return false;
+    this.leave();
     differ.forEach(([kind, at], i) => this.write(kind, at, contents[i]));
     this.changed = changes;
     return true;

@@ -34,6 +34,8 @@ export class Visit extends EventTarget {
     this.exposureEv = exposureEv;
     this.viewTransform = viewTransform;
     this.light = light;
+    /** @type {import("./lights.js").Lights | null} */
+    this.lights = null;
     /** @type {Found | null} */
     this.found = null;
     /** @type {Vector | null} the centre of orbit; null on foot */
@@ -231,10 +233,10 @@ export class Visit extends EventTarget {
   /** Show what the page's address holds. */
   async restore() {
     const { camera, state, light, ...look } = readAddress(location.hash, this.manifest);
-    this.light = light;
-    this.dispatchEvent(new Event("light"));
     this.expose(look);
     this.view(camera);
     if (state !== this.state) await this.choose(state);
+    this.light = light; // last: a state brings its own
+    this.dispatchEvent(new Event("light"));
   }
 }
