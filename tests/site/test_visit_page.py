@@ -167,6 +167,9 @@ def test_walks_links_and_pictures(chromium, device, store, site):
         assert np.array_equal(camera_of(page), camera) and page.inner_text("#ev") == "+1 1/3 EV"
         assert page.get_attribute("#states button >> text=blue", "aria-pressed") == "true"
         assert page.input_value("#transform") == "1"
+        page.evaluate("() => { navigator.clipboard.writeText = () => Promise.reject(new Error('refused')); }")
+        page.click("#share")
+        page.wait_for_selector(f"#said .stays >> text={page.url}")
         page.click("#reset")
         assert page.inner_text("#ev") == "0 EV" and page.is_disabled("#reset")
 
@@ -185,7 +188,14 @@ def test_walks_links_and_pictures(chromium, device, store, site):
     assert flip(native / 255, pixels / 255).mean < 0.02, "the picture that is saved has the state, exposure, transform"
 
 
-def test_by_fingers(chromium, site, hit):
+PAD = """(pad) => {
+  const buttons = Array.from({ length: 17 }, (_, i) => ({ pressed: i === pad.pressed, value: 0 }));
+  navigator.getGamepads = () => [{ mapping: "standard", axes: pad.axes, buttons }];
+  window.dispatchEvent(new Event("gamepadconnected"));
+}"""
+
+
+def test_by_fingers_and_gamepad(chromium, site, hit):
     with chromium(has_touch=True, reduced_motion="reduce") as page, served(site) as address:
         faults = opened(page, address)
         first = camera_of(page)
@@ -212,4 +222,13 @@ def test_by_fingers(chromium, site, hit):
         moved(page, lambda: fingers("touchMove", (100, 120), (220, 120)))
         fingers("touchEnd")
         assert not np.array_equal(camera_of(page)[:3], pivot[:3]), "a pinch draws nearer"
+
+        page.evaluate(PAD, {"pressed": 0, "axes": [0, 0, 0, 0]})
+        page.wait_for_selector(f"body[data-camera='{','.join(f'{x:g}' for x in first)}']", state="attached")
+        page.evaluate(PAD, {"pressed": 1, "axes": [0, 0, 0, 0]})
+        page.wait_for_selector("body[data-state='blue']", state="attached")
+        moved(page, lambda: page.evaluate(PAD, {"pressed": -1, "axes": [0, -1, 0, 0]}))
+        page.evaluate(PAD, {"pressed": -1, "axes": [0.1, 0, 0, 0]})
+        ahead = camera_of(page) - first
+        assert ahead[2] < 0 and ahead[0] == pytest.approx(0, abs=1e-3), "the left stick walks ahead"
         assert faults == []

@@ -1,7 +1,5 @@
 // The card of a thing that was clicked: what it is made of, how that was measured, and in which finishes it comes.
 
-import { failed, say } from "./messages.js";
-
 /** @typedef {import("./visit.js").Visit} Visit */
 
 /** @param {string} id @returns {any} */
@@ -42,12 +40,9 @@ function offerFinishes(visit, material, now) {
   const buttons = offered.map(({ finish, label }) => {
     const button = element("button", label);
     button.setAttribute("aria-pressed", String(finish === now));
-    button.addEventListener("click", () => {
-      visit
-        .choose(stateWith(visit.manifest, visit.state, material, finish))
-        .then(() => say(label))
-        .catch(failed);
-    });
+    button.addEventListener("click", () =>
+      visit.choose(stateWith(visit.manifest, visit.state, material, finish), label),
+    );
     return button;
   });
   list.replaceChildren(...buttons);

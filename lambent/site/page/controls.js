@@ -21,12 +21,7 @@ export function openPanel(visit) {
     found(part).textContent = about[part];
     found(part).hidden = !about[part];
   }
-  const ofStates = offer("states", namesOf(states), (number) => {
-    visit
-      .choose(number)
-      .then(() => say(states[number].name))
-      .catch(failed);
-  });
+  const ofStates = offer("states", namesOf(states), (number) => visit.choose(number));
   offer("views", namesOf(cameras), (number) => {
     visit.view(cameras[number]);
     say(cameras[number].name);

@@ -2,7 +2,7 @@
 
 import { KEYS, stepsOf } from "./camera.js";
 import { watchPads } from "./gamepad.js";
-import { failed, say } from "./messages.js";
+import { say } from "./messages.js";
 import { FAST } from "./visit.js";
 
 /** @typedef {import("./visit.js").Visit} Visit */
@@ -28,7 +28,7 @@ export function follow(visit) {
   window.addEventListener("keydown", (event) => press(visit, event));
   window.addEventListener("keyup", (event) => visit.held.delete(keyOf(event)));
   window.addEventListener("blur", () => visit.held.clear());
-  window.addEventListener("hashchange", () => visit.restore().catch(failed));
+  window.addEventListener("hashchange", () => visit.restore());
   new ResizeObserver(() => visit.touch()).observe(canvas);
   watchPads(
     (pad, dtS) => visit.steer(pad, dtS),
@@ -138,10 +138,6 @@ function push(visit, button) {
     visit.view(camera);
     say(camera.name);
   } else {
-    const number = (visit.state + 1) % states.length;
-    visit
-      .choose(number)
-      .then(() => say(states[number].name))
-      .catch(failed);
+    visit.choose((visit.state + 1) % states.length);
   }
 }

@@ -1,7 +1,5 @@
 // Rays against the triangles of the room: lambent/viewer/cameras/picking.py, and its floors as views/walls.py.
 
-import { cross, minus } from "./camera.js";
-
 /** @typedef {import("./camera.js").Vector} Vector */
 /** @typedef {{name: string, material: string, first: number, count: number, bounds: [Vector, Vector]}} Thing */
 /** @typedef {{thing: Thing | null, m: number, face: number}} Hit distance in m, Infinity for none */
@@ -28,8 +26,11 @@ export class Geometry {
 
   /** Normal of a triangle, as long as twice its area. @param {number} face @returns {Vector} */
   normal(face) {
-    const [a, b, c] = [0, 3, 6].map((i) => this.corner(CORNERS * face + i));
-    return cross(minus(b, a), minus(c, a));
+    const c = this.corners,
+      i = CORNERS * face;
+    const [ux, uy, uz] = [c[i + 3] - c[i], c[i + 4] - c[i + 1], c[i + 5] - c[i + 2]],
+      [vx, vy, vz] = [c[i + 6] - c[i], c[i + 7] - c[i + 1], c[i + 8] - c[i + 2]];
+    return [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
   }
 
   /** @param {number} i @returns {Vector} */

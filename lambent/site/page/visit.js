@@ -2,7 +2,7 @@
 
 import { addressOf, cameraAddress, readAddress } from "./address.js";
 import * as c from "./camera.js";
-import { tellRest } from "./messages.js";
+import { failed, say, tellRest } from "./messages.js";
 import { glide, isFloor, standingAt, turned } from "./moves.js";
 
 /** @typedef {c.Camera} Camera */
@@ -209,12 +209,17 @@ export class Visit extends EventTarget {
     this.changed();
   }
 
-  /** Show a state of the room, once what it needs has arrived. @param {number} number */
-  async choose(number) {
+  /** Show a state of the room once what it needs has arrived, and say so. @param {number} number @param {string} label */
+  async choose(number, label = this.manifest.states[number].name) {
     this.state = number;
     this.changed();
-    if (this.frame && this.data) await this.frame.show(number, this.data);
+    try {
+      if (this.data) await this.frame?.show(number, this.data);
+    } catch (error) {
+      return failed(error);
+    }
     tellRest("");
+    say(label);
     document.body.dataset.state = this.manifest.states[number].name;
     this.touch();
   }
