@@ -152,6 +152,7 @@ def test_walks_are_those_of_python(javascript):
     paths = [
         CameraPath("steady", keys, 9.0), CameraPath("recorded", keys, 9.0, times),
         CameraPath("two", keys[:2], 4.0, (0.0, 4.0)), CameraPath("one", keys[:1]),
+        CameraPath("with a pause", (keys[0], replace(keys[0], target=(5.0, 1.0, 0.0)), *keys[3:]), 5.0),
         CameraPath("in place", (keys[0], replace(keys[0], target=(5.0, 1.0, 0.0))), 3.0),
     ]  # fmt: skip
     at = [-1.0, 0.0, 0.4, 1.0, 2.2, 3.99, 4.0, 7.3, 9.0, 20.0]
