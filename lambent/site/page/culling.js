@@ -19,26 +19,22 @@ export class Clusters {
   }
 
   /** Which clusters a camera may see. @param {Rows} clip */
-  visible(clip) {
-    const [x, y, z, w] = clip,
-      { sizes } = this,
+  visible([x, y, z, w]) {
+    const { sizes } = this,
       found = new Uint8Array(this.count).fill(1);
-    /** @param {number[]} a @param {number[]} b @param {number} s */
-    const plus = (a, b, s) => a.map((value, i) => value + s * b[i]);
-    const planes = [plus(w, x, 1), plus(w, x, -1), plus(w, y, -1), plus(w, y, 1), z, plus(w, z, -1)];
-    for (const [a, b, c, d] of planes) {
-      const [p, q, r, s] = [a, b, c, d].map(Math.abs);
+    /** @param {number[]} a @param {number} s */
+    const plus = (a, s) => w.map((value, i) => value + s * a[i]);
+    for (const [a, b, c, d] of [plus(x, 1), plus(x, -1), plus(y, -1), plus(y, 1), z, plus(z, -1)]) {
+      const p = Math.abs(a),
+        q = Math.abs(b),
+        r = Math.abs(c),
+        s = Math.abs(d);
       for (let k = 0, i = 0; k < this.count; k++, i += WORDS) {
-        const farthest =
-          sizes[i] * a +
-          sizes[i + 1] * b +
-          sizes[i + 2] * c +
-          sizes[i + 3] * p +
-          sizes[i + 4] * q +
-          sizes[i + 5] * r +
-          d;
+        const middle = sizes[i] * a + sizes[i + 1] * b + sizes[i + 2] * c + d,
+          half = sizes[i + 3] * p + sizes[i + 4] * q + sizes[i + 5] * r;
+        if (middle + half >= 0) continue;
         const reach = sizes[i + 6] * p + sizes[i + 7] * q + sizes[i + 8] * r + s;
-        if (farthest < -SLACK * reach) found[k] = 0; // what is not a number is drawn
+        if (middle + half < -SLACK * reach) found[k] = 0; // what is not a number is drawn
       }
     }
     return found;
@@ -68,11 +64,12 @@ export class Clusters {
     let owner = -1;
     for (let k = 0; k < this.count; k++) {
       if (!among[k]) continue;
-      const [begin, end, of] = places.subarray(3 * k, 3 * k + 3),
+      const begin = places[3 * k],
+        end = places[3 * k + 1],
         last = found[found.length - 1];
-      if (last && last[1] === begin && owner === of) last[1] = end;
+      if (last && last[1] === begin && owner === places[3 * k + 2]) last[1] = end;
       else found.push([begin, end]);
-      owner = of;
+      owner = places[3 * k + 2];
     }
     return found;
   }

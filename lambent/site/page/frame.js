@@ -216,12 +216,19 @@ export class Frame {
     if (view && one.camera === this.manifest.mirrors.buffers[view.number].frame) {
       pass.setScissorRect(view.rectangle[0], view.rectangle[1], view.rectangle[2], view.rectangle[3]);
     }
+    /** @type {Map<string, () => void>} what is set before the next draw: most of it is for objects out of view */
+    const set = new Map();
+    const draw = (/** @type {() => void} */ how) => {
+      for (const one of set.values()) one();
+      set.clear();
+      how();
+    };
     for (const [name, first, second, third] of camera ? sorted(one.commands, camera.eye) : one.commands) {
-      if (name === "setPipeline") pass.setPipeline(made.render_pipeline[first]);
-      else if (name === "setBindGroup") pass.setBindGroup(first, made.bind_group[second]);
-      else if (name === "setVertexBuffer") pass.setVertexBuffer(first, made.buffer[second]);
-      else if (name === "setIndexBuffer") pass.setIndexBuffer(made.buffer[first], second);
-      else if (name === "draw") pass.draw(first);
+      if (name === "setPipeline") set.set(name, () => pass.setPipeline(made.render_pipeline[first]));
+      else if (name === "setBindGroup") set.set(name + first, () => pass.setBindGroup(first, made.bind_group[second]));
+      else if (name === "setVertexBuffer") set.set(name, () => pass.setVertexBuffer(first, made.buffer[second]));
+      else if (name === "setIndexBuffer") set.set(name, () => pass.setIndexBuffer(made.buffer[first], second));
+      else if (name === "draw") draw(() => pass.draw(first));
       else if (name === "onlyUpright") {
         if (!view?.upright) break;
       } else if (camera) {
@@ -229,7 +236,9 @@ export class Frame {
           camera.thin ??= this.clusters.runs(this.clusters.thin(camera.clip, this.height, camera.visible));
         }
         const runs = name === "drawThin" ? /** @type {Runs} */ (camera.thin) : camera.seen;
-        for (const [face, count] of within(runs, third / 3, first / 3)) pass.drawIndexed(3 * count, 1, 3 * face);
+        for (const [face, count] of within(runs, third / 3, first / 3)) {
+          draw(() => pass.drawIndexed(3 * count, 1, 3 * face));
+        }
       }
     }
     pass.end();

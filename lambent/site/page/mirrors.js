@@ -72,8 +72,32 @@ function area(polygon) {
 
 /** Share of a frame that a reflector's triangles cover. @param {Float32Array} corners @param {number[][]} clip */
 export function shareOf(corners, clip) {
+  const places = [0, 1, 3].map((row) => {
+    const [a, b, c, d] = clip[row],
+      found = new Float64Array(corners.length / 3);
+    for (let i = 0, k = 0; k < found.length; k++, i += 3) {
+      found[k] = a * corners[i] + b * corners[i + 1] + c * corners[i + 2] + d;
+    }
+    return found;
+  });
+  const [x, y, w] = places;
   let sum = 0;
-  for (let i = 0; i < corners.length / 3; i += 3) sum += area(onScreen(corners, i, 3, clip));
+  for (let i = 0; i < w.length; i += 3) {
+    let out = 15; // sides that all corners are beyond, and whether a corner is beyond any
+    let isCut = false;
+    for (let k = i; k < i + 3; k++) {
+      const beyond =
+        (x[k] + w[k] > 0 ? 0 : 1) | (w[k] - x[k] > 0 ? 0 : 2) | (y[k] + w[k] > 0 ? 0 : 4) | (w[k] - y[k] > 0 ? 0 : 8);
+      out &= beyond;
+      isCut ||= beyond > 0 || w[k] <= LEAST_W;
+    }
+    if (out) continue;
+    if (isCut) sum += area(onScreen(corners, i, 3, clip));
+    else {
+      const [[ax, ay], [bx, by], [cx, cy]] = [i, i + 1, i + 2].map((k) => [x[k] / w[k], y[k] / w[k]]);
+      sum += Math.abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay)) / 8;
+    }
+  }
   return sum;
 }
 
