@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import os
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -60,10 +61,11 @@ def test_a_file_that_fails_after_the_first_picture_is_tried_again(chromium, stre
     large = [manifest["tables"]["texture"][at]["data"] for at in manifest["states"][0]["finer"]]
     missing, damaged = large[0]["file"], large[1]["file"]
     fails = {missing: lambda route: route.abort(), damaged: lambda route: route.fulfill(body=b"other bytes")}
-    waiting, faults = [], []
+    waiting, faults, asked = [], [], Counter()
 
     def answer(route):
         name = f"data/{route.request.url.rsplit('/', 1)[1]}"
+        asked[name] += 1
         if waiting is not None and name in fails:
             waiting.append(route)  # until the first picture is there
         else:
@@ -87,6 +89,7 @@ def test_a_file_that_fails_after_the_first_picture_is_tried_again(chromium, stre
             page.wait_for_selector("#message:empty", state="attached")
         page.wait_for_selector("#rest:empty", state="attached")
         assert faults == [] and fails == {} and len(held) == 2
+        assert {name for name, count in asked.items() if count > 1} == {missing, damaged}, "all else came once"
 
 
 HEAP_GROWTH, MEMORY_GROWTH = 0.5e6, 60e6  # bytes: of JavaScript, and of all processes, over all reloads

@@ -139,6 +139,7 @@ export class Lights {
     this.show();
     const changed = this.names.flatMap((name, i) => (Object.hasOwn(visit.light, name) ? [i] : []));
     await mixing?.load(changed);
+    await mixing?.objects.refined; // what a mix adds to is exact
     tellRest("");
     if (wanted !== this.asked) return; // a later one shows more
     mixing?.mix(this.factors, rests);

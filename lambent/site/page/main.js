@@ -45,7 +45,9 @@ async function open() {
     const of = done > all ? "" : ` of ${(all / MB).toFixed(1)}`;
     (shown ? tellRest : tell)(`Loading ${(done / MB).toFixed(1)}${of} MB…`);
   };
-  const data = new Data(report, neededAgain(manifest));
+  const { vertices, indices } = manifest.visit.geometry,
+    files = [vertices, indices].map((at) => manifest.tables.buffer[at].data.file); // for clicks, too
+  const data = new Data(report, new Set([...neededAgain(manifest), ...files]));
   device.lost.then((info) => {
     if (info.reason === "destroyed") return;
     tell("The graphics device was lost; loading the room again…");
@@ -63,7 +65,7 @@ async function open() {
       if (!visit) begin(here);
     }),
   ]);
-  tellRest("");
+  files.forEach((file) => data.files.delete(file));
 }
 
 /** @param {Visit} here */
@@ -76,14 +78,10 @@ function begin(here) {
 }
 
 /** Once more: what has not arrived, or everything where there is no picture yet. */
-async function again() {
-  if (!shown || !visit?.data) return open();
-  await shown.show(visit.state, visit.data);
-  tellRest("");
-}
+const again = () => (shown && visit?.data ? shown.show(visit.state, visit.data) : open());
 
 /** @param {() => Promise<void>} act */
-const attempt = (act) => act().catch(failed);
+const attempt = (act) => act().then(() => tellRest(""), failed);
 
 /** @type {Visit | undefined} */
 let visit;

@@ -42,6 +42,8 @@ export class Objects {
     this.changed = {};
     /** @type {Set<number>} places of textures that stand-ins fill */
     this.coarse = new Set();
+    /** @type {Promise<any>} none of them is left */
+    this.refined = Promise.resolve();
     /** @type {Promise<void>} one state's objects are made after another's */
     this.loaded = Promise.resolve();
     this.leave = () => {}; // called before contents become another state's, to undo what else wrote into them
@@ -137,7 +139,7 @@ export class Objects {
         finer();
       }
     };
-    await Promise.all(Array.from({ length: AT_ONCE }, one));
+    await (this.refined = Promise.all(Array.from({ length: AT_ONCE }, one)));
   }
 
   /** A buffer or texture that content is written to. @param {string} kind @param {any} one */
