@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats, Image, Indices
+from lambent.core.kernels import parallel
 from lambent.editing.products import Halves, HostProducts, Pixels, Products
 from lambent.editing.rows import PairTransport
 from lambent.materials.factored.curve import END_RAD, KNOTS, Curve
@@ -91,7 +92,7 @@ def viewed(theta_o: NDArray[np.float32], viewer: Curve) -> Pixels:
     return np.asarray(_looked_up(theta_o * np.float32(KNOTS / END_RAD), viewer.values.astype(np.float32)))
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
+@parallel()
 def _looked_up(step, values):  # type: ignore[no-untyped-def]
     out, last = np.empty((3, len(step)), np.float32), len(values) - 2
     for p in numba.prange(len(step)):
@@ -102,7 +103,7 @@ def _looked_up(step, values):  # type: ignore[no-untyped-def]
     return out
 
 
-@numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
+@parallel(fastmath=True)
 def _compose(image, pixel, picture, scale, multiplier):  # type: ignore[no-untyped-def]
     step = 0 if multiplier.shape[1] == 1 else 1
     for p in numba.prange(len(pixel)):

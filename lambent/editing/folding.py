@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lambent.baked.transport.wavelets import TAPS
 from lambent.core.arrays import Floats
+from lambent.core.kernels import parallel
 from lambent.editing.products import Halves, add_light, half_of_float
 
 TOGETHER = 16  # points whose rows stay in the first-level cache, each in another of its sets
@@ -62,7 +63,7 @@ def folded(
     return out.view(np.float16), scale
 
 
-@numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
+@parallel(fastmath=True)
 def _fold(out, spans, steps, values, means, places, taps):  # type: ignore[no-untyped-def]
     """`places` locates the bands in a pair's number: shift and mask of the edited curve, then of the idle one."""
     bands, _, points = out.shape

@@ -9,7 +9,6 @@ a third of the time. Its positions are flat indices of contiguous arrays.
 
 from __future__ import annotations
 
-import os
 from typing import Any, Protocol
 
 import numba
@@ -20,10 +19,8 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats
+from lambent.core.kernels import parallel
 
-# OpenMP's threads spin while they wait, unless told otherwise before the first kernel is loaded. On 2 cores shared with
-# other work, a frame of 512 x 512 pixels took 48 ms with spinning and 12 ms without.
-os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 BLOCK = 8192  # pixels whose sums stay in the first-level cache
 Halves = NDArray[np.float16]
 Pixels = NDArray[np.float32]
@@ -66,7 +63,7 @@ def unit_of(bits):  # type: ignore[no-untyped-def]
     return _float_of_bits(np.uint32(((bits >> 27) + 103) << 23))  # type: ignore[call-arg]
 
 
-@numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
+@parallel(fastmath=True)
 def _add(picture, transport, rows, weights, begin, end):  # type: ignore[no-untyped-def]
     channels = len(picture)
     blocks = (end - begin + BLOCK - 1) // BLOCK

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from lambent.core.arrays import Floats, Image
 from lambent.core.errors import UserError
+from lambent.core.kernels import parallel
 from lambent.core.views.camera import Camera, pixel_rays
 from lambent.editing.products import Halves, Pixels, float_of_half
 from lambent.scenes.geometry import turn
@@ -156,7 +157,7 @@ class SparseRows:
         return picture
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
+@parallel()
 def _add(picture, spans, points, values, block, rows, weights):  # type: ignore[no-untyped-def]
     for b in numba.prange(len(spans)):
         start = b * block

@@ -14,6 +14,8 @@ from typing import Any, cast
 import numba
 import numpy as np
 
+from lambent.core.kernels import parallel
+
 NO_LIGHT = np.float32(1e-30)
 LANES = 2048  # channels of points' light that a thread computes at a time
 BLOCK = 128  # texels, whose light fits into the L1 cache
@@ -22,11 +24,11 @@ _COMPILING, _NUMBA = Lock(), cast(Any, numba.config)
 
 def by_lanes(loop: Callable[..., Any]) -> Callable[..., Any]:
     """Compile a loop with LLVM's SLP vectorizer, which Numba leaves out: sums over channels become vector sums."""
-    compiled = numba.njit(parallel=True, cache=True, nogil=True)(loop)
+    compiled = parallel()(loop)
 
     @wraps(loop)
     def called(*arguments: Any) -> Any:
-        if compiled.signatures:
+        if compiled.compiled.signatures:  # type: ignore[attr-defined]
             return compiled(*arguments)
         with _COMPILING:
             before, _NUMBA.SLP_VECTORIZE = _NUMBA.SLP_VECTORIZE, 1
@@ -148,7 +150,7 @@ def nearest_code(weight, steps, one):  # type: ignore[no-untyped-def]
     return min(max(below + (weight > middle) + one, 0.0), 255.0)
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
+@parallel()
 def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
     """`answer_rays.packed_rays` into `rays` (K, R, 3), zeroed before, for rays to `numbers` with `weights` (K, R)."""
     for k in numba.prange(len(numbers)):
@@ -177,7 +179,7 @@ def pack(numbers, weights, steps, one, rays):  # type: ignore[no-untyped-def]
                 place += 1
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
+@parallel()
 def thin(starts, points, weights, table, light, steps, one, chosen, codes):  # type: ignore[no-untyped-def]
     """Sample n rays of each row k, which begin at `starts` (K + 1,), into indices `chosen` and weights `codes` (K, n).
 
@@ -210,7 +212,7 @@ def thin(starts, points, weights, table, light, steps, one, chosen, codes):  # t
                 place += 1
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
+@parallel()
 def unpack(rays, starts, points, weights):  # type: ignore[no-untyped-def]
     """Points and weights (N,) of packed rays (K, R, 3); those of row k begin at `starts` (K + 1,)."""
     for k in numba.prange(len(rays)):

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from lambent.core.kernels import parallel
 
-@numba.njit(parallel=True, cache=True, nogil=True)
+
+@parallel()
 def change(found, places, texels, material, other, sun, group_of_sun, before, now):  # type: ignore[no-untyped-def]
     """Write to `found` (G, N, 3), at `places` (n,), how the exitance that a probe sees differs between two states.
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from lambent.baking.light.denoise import fill
 from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.kernels import parallel
 from lambent.core.light.colour import HALF_MAX, luminance
 
 REACH = 2  # texels to each side: 5 x 5
@@ -43,7 +44,7 @@ def chart_means(values: Floats, known: Flags, labels: Indices, reach: int = REAC
     return np.asarray(means), np.asarray(count)
 
 
-@numba.njit(parallel=True, cache=True)
+@parallel()
 def _chart_means(values, known, labels, reach):  # type: ignore[no-untyped-def]
     height, width, channels = values.shape
     means, counts = np.zeros_like(values), np.zeros((height, width), np.float32)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from lambent.core.kernels import parallel
 from lambent.core.light.colour import HALF_MAX
 
 LEAST_NORMAL = np.float32(2.0**-14)
@@ -25,7 +26,7 @@ def half_bits(value):  # type: ignore[no-untyped-def]
     )
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
+@parallel()
 def put_sums(bits, values, rows, places, factors):  # type: ignore[no-untyped-def]
     """Write sums over n of values (n, T, 3) x factors (n, 3), at `rows` (K,), to bits (m, 4) at `places` (K,)."""
     for k in numba.prange(len(rows)):

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.core.arrays import Image
+from lambent.core.kernels import parallel
 from lambent.core.light.colour import HALF_MAX
 from lambent.editing.products import half_of_float
 
@@ -21,7 +22,7 @@ def looked_up(radiance: Image, table: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return out
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
+@parallel()
 def _look_up(out, values, table):  # type: ignore[no-untyped-def]
     largest = np.float32(HALF_MAX)
     for p in numba.prange(len(values)):

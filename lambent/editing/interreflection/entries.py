@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from lambent.baked.transport.wavelets import TAPS
 from lambent.core.arrays import Floats, Indices
+from lambent.core.kernels import parallel
 from lambent.editing.folding import TOGETHER, write_wavelets
 from lambent.editing.interreflection.powers import Powers
 from lambent.editing.products import Halves, Pixels, add_weighted_light, half_of_float, unit_of
@@ -120,7 +121,7 @@ def _ends(each: NDArray[np.integer]) -> NDArray[np.int64]:
     return np.concatenate([[0], np.cumsum(each, dtype=np.int64)])
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
+@parallel()
 def _room(ends, codes, most):  # type: ignore[no-untyped-def]
     """(P,) entries of each point, including those that bridge gaps."""
     room = np.empty(len(ends) - 1, np.int64)
@@ -133,7 +134,7 @@ def _room(ends, codes, most):  # type: ignore[no-untyped-def]
     return room
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
+@parallel()
 def _step(ends, codes, values, begins, steps, out, most):  # type: ignore[no-untyped-def]
     for p in numba.prange(len(ends) - 1):
         at, before = begins[p], np.int64(0)
@@ -148,7 +149,7 @@ def _step(ends, codes, values, begins, steps, out, most):  # type: ignore[no-unt
             at += 1
 
 
-@numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
+@parallel(fastmath=True)
 def _largest(ends, values, units):  # type: ignore[no-untyped-def]
     largest = np.float32(0)
     for p in numba.prange(len(units)):
@@ -162,7 +163,7 @@ def _largest(ends, values, units):  # type: ignore[no-untyped-def]
     return largest
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
+@parallel()
 def _mark(met, codes, bands):  # type: ignore[no-untyped-def]
     for n in numba.prange(len(codes)):
         met[codes[n] // bands] = True
@@ -252,7 +253,7 @@ def _tables(
     return band, tail, cells.number
 
 
-@numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
+@parallel(fastmath=True)
 def _pixels(out, ends, steps, values, bits_of_bands, units, band, tail, cell, factor):  # type: ignore[no-untyped-def]
     cells, _, points = out.shape
     row, moving = np.arange(len(band)) % APART, 0 if factor.shape[1] == 1 else 1
@@ -268,7 +269,7 @@ def _pixels(out, ends, steps, values, bits_of_bands, units, band, tail, cell, fa
             sums[:] = 0
 
 
-@numba.njit(parallel=True, fastmath=True, cache=True, nogil=True)
+@parallel(fastmath=True)
 def _rows(out, ends, steps, values, bits_of_bands, units, band, tail, cell, row, taps):  # type: ignore[no-untyped-def]
     cells, count, _, points = out.shape
     for part in numba.prange((points + AT_ONCE - 1) // AT_ONCE):
@@ -300,7 +301,7 @@ def _add(sums, met, first, many, ends, steps, values, bits_of_bands, units, band
             )
 
 
-@numba.njit(parallel=True, cache=True, nogil=True)
+@parallel()
 def _halve(out, sums, factor):  # type: ignore[no-untyped-def]
     for n in numba.prange(len(out)):
         out[n] = half_of_float(sums[n] * factor)  # type: ignore[call-arg]

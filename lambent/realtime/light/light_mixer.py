@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from lambent.core.arrays import Floats
-from lambent.core.background import yielding_to_frames
+from lambent.core.kernels import yielding_to_frames
 from lambent.core.light.light_mix import Factors
 from lambent.realtime.gpu.cube_mips import finite
 from lambent.realtime.gpu.device import adapter_info

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lambent.baked.answering.stored import has_answer, read_answer
-from lambent.core.background import yielding_to_frames
 from lambent.core.errors import UserError
+from lambent.core.kernels import yielding_to_frames
 from lambent.core.progress import Progress
 from lambent.materials.document import Material
 from lambent.realtime.answering.answer_shown import answered, users_of
