@@ -4,6 +4,7 @@
     python3 run.py demo [ARGS]     the whole flow: measure, fit, bake, walk
     python3 run.py lambent ARGS    any command, e.g. `python3 run.py lambent doctor`
     python3 run.py test [ARGS]     style, types and tests; with ARGS, pytest alone with these
+    python3 run.py test --bounds [ARGS]  likewise, pytest alone: compiled loops check every index
     python3 run.py docs            the documentation as a site, in out/site
 
 The first run makes .venv here, installs the versions named in constraints.txt, and asks `lambent doctor` what the
@@ -69,6 +70,9 @@ def run_lambent(arguments):
 
 
 def run_tests(arguments):
+    if arguments[:1] == ["--bounds"]:  # loops compiled with checks are kept apart from those without
+        os.environ |= {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(VENV / "checked-loops")}
+        arguments = arguments[1:] or ["-q"]
     if arguments:
         return subprocess.call([PYTHON, "-m", "pytest", *arguments], cwd=HOME)
     failed = []

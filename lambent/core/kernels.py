@@ -22,12 +22,15 @@ _turn = Lock()
 def parallel(**options: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Compile a loop over `numba.prange`; the result can be called from any threads at once.
 
-    Every parallel loop of Lambent is made here. `options` go to `numba.njit`; the dispatcher is `.compiled`.
+    Every parallel loop of Lambent is made here. `options` go to `numba.njit`; the dispatcher is `.compiled`. With
+    NUMBA_BOUNDSCHECK=1, loops are serial: numba loses the errors of its other threads.
     """
     import numba
 
+    together = not numba.config.BOUNDSCHECK  # type: ignore[attr-defined]
+
     def decorate(loop: Callable[..., Any]) -> Callable[..., Any]:
-        compiled = numba.njit(parallel=True, cache=True, nogil=True, **options)(loop)
+        compiled = numba.njit(parallel=together, cache=True, nogil=True, **options)(loop)
 
         @wraps(loop)
         def called(*arguments: Any) -> Any:

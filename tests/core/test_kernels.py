@@ -79,9 +79,19 @@ def test_a_forked_process_does_not_wait_for_a_thread_that_it_lacks() -> None:
     assert run(FORK, "workqueue").returncode == 0
 
 
+def test_checked_bounds_stop_parallel_loops(tmp_path: Path) -> None:
+    settings = os.environ | {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
+    program = "import numpy as np\nfrom lambent.core.pictures.half import put_sums\n" + (
+        "put_sums(np.zeros((2, 4), np.uint16), np.ones((1, 2, 3), np.float32), *np.full((2, 1), 2), "
+        "np.ones((1, 3), np.float32))"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], env=settings, capture_output=True, text=True)
+    assert "IndexError: index is out of bounds" in ended.stderr
+
+
 def test_every_parallel_loop_takes_turns() -> None:
     texts = {path.relative_to(PACKAGE).as_posix(): path.read_text() for path in PACKAGE.rglob("*.py")}
-    assert [name for name, text in texts.items() if "parallel=True" in text] == ["core/kernels.py"]
+    assert [name for name, text in texts.items() if "parallel=" in text and "njit" in text] == ["core/kernels.py"]
     assert sum(text.count("@parallel(") + text.count("@by_lanes\n") for text in texts.values()) > 20
 
 
