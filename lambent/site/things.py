@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from lambent.core.views.camera import CameraPath
 from lambent.materials.document import Provenance
 from lambent.realtime.frame_state import FALSE_COLOUR, VIEW_TRANSFORMS
 from lambent.realtime.gpu.pipelines import VERTEX_FLOATS
 from lambent.realtime.resources import SceneResources
 from lambent.scenes.scene import ImageTexture, Look, Variant
-from lambent.site.manifest import Manifest, camel
+from lambent.site.chunks import Packing
+from lambent.site.manifest import Manifest
+from lambent.site.walks import walk_of
 from lambent.store.contract import SceneRecord, whole_objects
 from lambent.store.kept.views import read_views, with_views
 
@@ -54,8 +56,14 @@ def things(
         ],
         "finishes": finishes,
         "finishesOfStates": [{name: finish(name, state) for name in used} for state in states],
-        "paths": [camel(asdict(path)) for path in with_views(record, read_views(folder)).paths],
+        "paths": [_walk(path, manifest) for path in with_views(record, read_views(folder)).paths],
     }  # fmt: skip
+
+
+def _walk(path: CameraPath, manifest: Manifest) -> dict[str, Any]:
+    cameras = walk_of(path)
+    packing = Packing(4, cameras.shape[1], [(cameras.size, 0)])
+    return {"name": path.name, "seconds": path.seconds, "cameras": manifest.chunks.add(cameras.tobytes(), packing)}
 
 
 def facts_of(look: Look, textured: str) -> Facts:

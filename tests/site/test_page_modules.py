@@ -58,10 +58,10 @@ def test_steps_and_looks_are_those_of_the_window(javascript, camera):
         (["ArrowLeft", "a"], 0.5, 1),
         (["w"] * 1, 0.25, 3),
     ] * 4
-    code = """import {look, walk} from './camera.js';
+    code = """import {look, pushOf, walk} from './camera.js';
     let camera = given.camera; const found = [];
     for (const [keys, dt, fast] of given.steps) {
-      camera = walk(camera, keys, dt, given.bounds, fast); found.push(camera);
+      camera = walk(camera, pushOf(keys), dt, given.bounds, fast); found.push(camera);
       camera = look(camera, 37, -11); found.push(camera);
     }
     say(found);"""

@@ -1,8 +1,9 @@
 // Pinhole cameras, and how they move: lambent/core/views/camera.py and lambent/viewer/cameras/cameras.py in JavaScript.
 
-/** @typedef {[number, number, number]} Vector */
+import { along, clamp, cross, dot, minus, unit } from "./vectors.js";
+
+/** @import { Bounds, Vector } from "./vectors.js" */
 /** @typedef {{name: string, position: Vector, target: Vector, up: Vector, fovYDeg: number}} Camera */
-/** @typedef {[Vector, Vector]} Bounds */
 
 export const TURN_RAD_PX = (0.3 * Math.PI) / 180;
 const PITCH_LIMIT_RAD = (85 * Math.PI) / 180;
@@ -15,31 +16,19 @@ const EYE_HEIGHT_M = 1.6,
   ZOOM_PER_STEP = 0.88,
   FARTHEST_SIZES = 20; // of the scene
 
-/** @type {Record<string, Vector>} right, up, forward by `KeyboardEvent.key` */
-export const KEYS = {
-  w: [0, 0, 1],
-  ArrowUp: [0, 0, 1],
-  s: [0, 0, -1],
-  ArrowDown: [0, 0, -1],
-  d: [1, 0, 0],
-  ArrowRight: [1, 0, 0],
-  a: [-1, 0, 0],
-  ArrowLeft: [-1, 0, 0],
-};
+/** @type {Record<string, [number, number]>} right and forward */
+const WAYS = { w: [0, 1], s: [0, -1], d: [1, 0], a: [-1, 0] };
+/** @type {Record<string, string>} */
+const ARROWS = { ArrowUp: "w", ArrowDown: "s", ArrowRight: "d", ArrowLeft: "a" };
 
-/** @param {Vector} a @param {Vector} b @returns {Vector} */
-export const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-/** @param {Vector} a @param {Vector} b @param {number} s @returns {Vector} a + s b */
-export const along = (a, b, s) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
-/** @param {Vector} a @param {Vector} b */
-export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-/** @param {Vector} a @param {Vector} b @returns {Vector} */
-export const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-/** @param {Vector} a @returns {Vector} */
-export const unit = (a) => {
-  const length = Math.hypot(...a);
-  return length > 0 ? [a[0] / length, a[1] / length, a[2] / length] : a;
-};
+/** The way of a key that moves. @param {string} key */
+export const wayOf = (key) => WAYS[ARROWS[key] ?? key];
+
+/** To the right and forward, by held keys. @param {Iterable<string>} keys @returns {[number, number]} */
+export function pushOf(keys) {
+  const ways = [...keys].map(wayOf);
+  return [ways.reduce((sum, [right]) => sum + right, 0), ways.reduce((sum, [, forward]) => sum + forward, 0)];
+}
 
 /** Right, up and forward. @param {Camera} camera @returns {[Vector, Vector, Vector]} */
 export function axes(camera) {
@@ -62,8 +51,7 @@ export function frameOf(camera, width, height, nearM, jitter = [0, 0]) {
   const half = Math.tan((camera.fovYDeg * Math.PI) / 360),
     x = height / (half * width),
     y = 1 / half;
-  /** @param {Vector} axis */
-  const behind = (axis) => -dot(axis, camera.position);
+  const behind = (/** @type {Vector} */ axis) => -dot(axis, camera.position);
   const ahead = [...forward, behind(forward)],
     [aside, down] = [(2 * jitter[0]) / width, (2 * jitter[1]) / height];
   const rows = [
@@ -92,7 +80,7 @@ export function yawPitch(camera) {
 
 /** @param {number} yaw @param {number} pitch @returns {Vector} */
 export function direction(yaw, pitch) {
-  const p = Math.min(Math.max(pitch, -PITCH_LIMIT_RAD), PITCH_LIMIT_RAD);
+  const p = clamp(pitch, -PITCH_LIMIT_RAD, PITCH_LIMIT_RAD);
   return [Math.cos(p) * Math.sin(yaw), Math.sin(p), -Math.cos(p) * Math.cos(yaw)];
 }
 
@@ -115,9 +103,8 @@ export function look(camera, dx, dy) {
 
 /** To the right, up and ahead of a level camera. @param {number} yaw @param {number} pitch @returns {Vector[]} */
 function level(yaw, pitch) {
-  const ahead = direction(yaw, pitch);
-  /** @type {Vector} */
-  const right = [Math.cos(yaw), 0, Math.sin(yaw)];
+  const ahead = direction(yaw, pitch),
+    /** @type {Vector} */ right = [Math.cos(yaw), 0, Math.sin(yaw)];
   return [right, cross(right, ahead), ahead];
 }
 
@@ -135,7 +122,7 @@ export function orbit(camera, dx, dy, pivot = camera.target) {
 export function zoom(camera, steps, bounds, pivot = camera.target) {
   const before = Math.max(Math.hypot(...minus(pivot, camera.position)), NEAREST_M),
     most = FARTHEST_SIZES * Math.hypot(...minus(bounds[1], bounds[0]));
-  return nearer(camera, pivot, Math.min(Math.max(before * ZOOM_PER_STEP ** steps, NEAREST_M), most) / before);
+  return nearer(camera, pivot, clamp(before * ZOOM_PER_STEP ** steps, NEAREST_M, most) / before);
 }
 
 /** Move to this share of the distance from a place. @param {Camera} camera @param {Vector} pivot @param {number} share @returns {Camera} */
@@ -176,40 +163,24 @@ export const isWithin = (place, [low, high]) => place.every((x, i) => x >= low[i
 export function confined(eye, before, [low, high]) {
   const found = eye.map((value, i) => {
     const margin = Math.min(WALL_M, 0.1 * (high[i] - low[i]));
-    const least = Math.min(low[i] + margin, before[i]),
-      most = Math.max(high[i] - margin, before[i]);
-    return Math.min(Math.max(value, least), most);
+    return clamp(value, Math.min(low[i] + margin, before[i]), Math.max(high[i] - margin, before[i]));
   });
   return /** @type {Vector} */ (found);
 }
 
-/** To the right and forward, by held keys and a stick. @param {Iterable<string>} keys @param {[number, number]} stick */
-export function pushOf(keys, [right, forward]) {
-  for (const key of keys) {
-    const way = KEYS[key];
-    if (way) [right, forward] = [right + way[0], forward + way[2]];
-  }
-  return [right, forward];
-}
-
 /**
  * Move on foot: at eye height above the floor, within the scene's bounds.
- * @param {Camera} camera @param {Iterable<string>} keys held @param {number} dtS @param {Bounds} bounds
- * @param {number} fast factor @param {[number, number]} stick right, forward
- * @param {number} floorY by default the lowest point of the scene @returns {Camera}
+ * @param {Camera} camera @param {[number, number]} push right, forward @param {number} dtS @param {Bounds} bounds
+ * @param {number} fast factor @param {number} floorY by default the lowest point of the scene @returns {Camera}
  */
-export function walk(camera, keys, dtS, bounds, fast = 1, stick = [0, 0], floorY = bounds[0][1]) {
-  const [right, forward] = pushOf(keys, stick);
+export function walk(camera, [right, forward], dtS, bounds, fast = 1, floorY = bounds[0][1]) {
   const length = Math.hypot(right, forward);
   if (!length) return camera;
   dtS = Math.min(dtS, LONGEST_STEP_S);
-  const eyeHeightM = eyeHeightOf(bounds);
   const [yaw, pitch] = yawPitch(camera),
-    step = paceOf(bounds) * fast * dtS;
-  /** @type {Vector} */
-  const across = [Math.cos(yaw), 0, Math.sin(yaw)];
-  const share = step / Math.max(length, 1);
-  const eye = along(along(camera.position, across, share * right), direction(yaw, 0), share * forward);
-  eye[1] += (floorY + eyeHeightM - eye[1]) * (1 - Math.exp(-dtS / SETTLE_S));
+    share = (paceOf(bounds) * fast * dtS) / Math.max(length, 1);
+  const across = along(camera.position, [Math.cos(yaw), 0, Math.sin(yaw)], share * right);
+  const eye = along(across, direction(yaw, 0), share * forward);
+  eye[1] += (floorY + eyeHeightOf(bounds) - eye[1]) * (1 - Math.exp(-dtS / SETTLE_S));
   return placed(camera, confined(eye, camera.position, bounds), direction(yaw, pitch));
 }

@@ -1,9 +1,8 @@
 // The card of a thing that was clicked: what it is made of, how that was measured, and in which finishes it comes.
 
-/** @typedef {import("./visit.js").Visit} Visit */
+import { element, found, offer } from "./elements.js";
 
-/** @param {string} id @returns {any} */
-const found = (id) => document.getElementById(id);
+/** @import { Visit } from "./visit.js" */
 
 /** Show what the visitor clicks. @param {Visit} visit */
 export function openCard(visit) {
@@ -20,33 +19,34 @@ export function openCard(visit) {
 function fill(visit) {
   const thing = visit.found?.thing;
   found("card").hidden = !thing;
-  found("orbit").setAttribute("aria-pressed", String(visit.pivot !== null));
+  found("orbit").ariaPressed = String(visit.pivot !== null);
   if (!thing) return;
   const { finishes, finishesOfStates } = visit.manifest.visit,
     now = finishesOfStates[visit.state][thing.material],
     { name, facts } = finishes[now];
   const lines = [["Finish", name], ...(facts.length ? facts : [["Measurement", "none on record"]])];
   found("thing").textContent = thing.name;
-  found("facts").replaceChildren(...lines.flatMap(([what, text]) => [element("dt", what), element("dd", text)]));
+  found("facts").replaceChildren(
+    ...lines.flatMap(([what, textContent]) => [element("dt", { textContent: what }), element("dd", { textContent })]),
+  );
   offerFinishes(visit, thing.material, now);
 }
 
 /** @param {Visit} visit @param {string} material @param {number} now */
 function offerFinishes(visit, material, now) {
   const offered = finishesOf(visit.manifest, material),
+    place = offered.findIndex(({ finish }) => finish === now),
     list = found("finishes"),
-    focused = list.contains(document.activeElement);
+    isFocused = list.contains(document.activeElement);
+  const choose = (/** @type {number} */ i) =>
+    visit.choose(stateWith(visit.manifest, visit.state, material, offered[i].finish), offered[i].label);
+  offer(
+    "finishes",
+    offered.map(({ label }) => label),
+    choose,
+  )(place);
   list.hidden = offered.length < 2;
-  const buttons = offered.map(({ finish, label }) => {
-    const button = element("button", label);
-    button.setAttribute("aria-pressed", String(finish === now));
-    button.addEventListener("click", () =>
-      visit.choose(stateWith(visit.manifest, visit.state, material, finish), label),
-    );
-    return button;
-  });
-  list.replaceChildren(...buttons);
-  if (focused) buttons.find((one) => one.getAttribute("aria-pressed") === "true")?.focus();
+  if (isFocused) list.children[place].focus();
 }
 
 /** The finishes of a material in all states; those of one name with the state that has them. @param {any} manifest @param {string} material @returns {{finish: number, label: string}[]} */
@@ -68,11 +68,4 @@ export function stateWith({ visit }, now, material, finish) {
     one[material] === finish ? Object.keys(one).filter((name) => one[name] !== all[now][name]).length : Infinity,
   );
   return differences.indexOf(Math.min(...differences));
-}
-
-/** @param {string} kind @param {string} text */
-function element(kind, text) {
-  const made = document.createElement(kind);
-  made.textContent = text;
-  return made;
 }

@@ -162,9 +162,9 @@ export class Frame {
     this.record(buffer, base, offsets, fields);
     if (index >= 0)
       this.device.queue.writeBuffer(this.objects.made.buffer[weight], 0, new Float32Array([1 / (index + 1)]));
-    /** @type {Map<number, {clip: number[][], eye: import("./camera.js").Vector, visible: Uint8Array, seen: Runs, thin: Runs | null}>} */
+    /** @type {Map<number, {clip: number[][], eye: import("./vectors.js").Vector, visible: Uint8Array, seen: Runs, thin: Runs | null}>} */
     const seen = new Map();
-    /** @param {number} at @param {number[][]} clip @param {import("./camera.js").Vector} eye */
+    /** @param {number} at @param {number[][]} clip @param {import("./vectors.js").Vector} eye */
     const look = (at, clip, eye) => {
       const visible = this.clusters.visible(clip);
       seen.set(at, { clip, eye, visible, seen: this.clusters.runs(visible), thin: null });

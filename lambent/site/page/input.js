@@ -1,11 +1,11 @@
 // Mouse, fingers, keys and gamepad over the picture.
 
-import { KEYS, stepsOf } from "./camera.js";
+import { stepsOf, wayOf } from "./camera.js";
 import { watchPads } from "./gamepad.js";
 import { say } from "./messages.js";
 import { FAST } from "./visit.js";
 
-/** @typedef {import("./visit.js").Visit} Visit */
+/** @import { Visit } from "./visit.js" */
 /** @typedef {{x: number, y: number, wanders: boolean}} Pointer */
 
 const CLICK_PX = { mouse: 4, touch: 12, pen: 12 }, // a press that moves less is a click; fingers waver
@@ -44,11 +44,11 @@ function halt(visit, event) {
 
 /** One finger or the mouse looks or orbits, two fingers walk or zoom; a click picks. */
 class Pointers {
+  /** @type {Map<number, Pointer>} */ down = new Map();
+
   /** @param {Visit} visit */
   constructor(visit) {
     this.visit = visit;
-    /** @type {Map<number, Pointer>} */
-    this.down = new Map();
     const { canvas } = visit;
     canvas.addEventListener("pointerdown", (event) => this.press(event));
     canvas.addEventListener("pointermove", (event) => this.drag(event));
@@ -75,7 +75,7 @@ class Pointers {
     this.down.set(pointerId, { x: clientX, y: clientY, wanders: true });
     if (this.down.size === 1) visit.turn(dx, dy);
     else if (visit.pivot) visit.zoom(stepsOf(this.spread() / before));
-    else if (far) visit.step([], far / DRAG_PX_S, FAST, [-dx / far, dy / far]);
+    else if (far) visit.step([-dx / far, dy / far], far / DRAG_PX_S, FAST);
   }
 
   /** Px between two fingers. */
@@ -101,7 +101,7 @@ function scroll(visit, event) {
   event.preventDefault();
   const up = (-event.deltaY * (event.deltaMode ? LINES_PX : 1)) / NOTCH;
   if (visit.pivot) visit.zoom(up);
-  else if (up) visit.step([up > 0 ? "w" : "s"], NOTCH_S * Math.abs(up));
+  else if (up) visit.step([0, Math.sign(up)], NOTCH_S * Math.abs(up));
 }
 
 /** @param {KeyboardEvent} event */
@@ -113,7 +113,7 @@ function press(visit, event) {
     target = event.target instanceof Element ? event.target : document.body;
   visit.fast = event.shiftKey ? FAST : 1;
   if (event.ctrlKey || event.metaKey || event.altKey || target.closest("input, select")) return;
-  if (key in KEYS) {
+  if (wayOf(key)) {
     event.preventDefault();
     if (!visit.held.size) visit.lastMs = performance.now();
     visit.held.add(key);

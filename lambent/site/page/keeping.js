@@ -1,15 +1,16 @@
 // What a visitor takes away: a link to what they see, and its picture.
 
+import { element, found } from "./elements.js";
 import { say } from "./messages.js";
 
-/** @typedef {import("./visit.js").Visit} Visit */
+/** @import { Visit } from "./visit.js" */
 
 const COPIED = "Link copied";
 const LONGEST_BYTES = 240; // of a file's name without its ending; file systems take 255
 
 /** Put what is seen into the address, and copy that. @param {Visit} visit */
 export async function share(visit) {
-  const button = /** @type {HTMLElement} */ (document.getElementById("share")),
+  const button = found("share"),
     address = visit.address(),
     text = button.textContent;
   history.replaceState(null, "", `#${address}`);
@@ -36,15 +37,14 @@ export async function keep(visit) {
   if (!frame) return;
   const { width, height } = frame,
     pixels = await frame.pixels(camera);
-  const canvas = Object.assign(document.createElement("canvas"), { width, height });
+  const canvas = element("canvas", { width, height });
   canvas.getContext("2d")?.putImageData(new ImageData(pixels, width, height), 0, 0);
   const blob = await new Promise((done) => canvas.toBlob(done, "image/png")),
-    link = document.createElement("a");
-  link.href = URL.createObjectURL(blob);
-  link.download = fileName([manifest.name, manifest.states[visit.state].name, camera.name]);
+    download = fileName([manifest.name, manifest.states[visit.state].name, camera.name]),
+    link = element("a", { href: URL.createObjectURL(blob), download });
   link.click();
   URL.revokeObjectURL(link.href);
-  say(`${link.download} saved`);
+  say(`${download} saved`);
 }
 
 /** A name for a file that all systems take. @param {string[]} parts */

@@ -1,11 +1,9 @@
 // What the page says: while it loads, when something goes wrong, and what has changed.
 
+import { element, found } from "./elements.js";
 import { FileError, SiteError } from "./loading.js";
 
-const message = /** @type {HTMLElement} */ (document.getElementById("message"));
-const retry = /** @type {HTMLButtonElement} */ (document.getElementById("again"));
-const rest = /** @type {HTMLElement} */ (document.getElementById("rest"));
-const said = /** @type {HTMLElement} */ (document.getElementById("said"));
+const [message, retry, rest, said] = ["message", "again", "rest", "said"].map(found);
 /** @type {any} */
 let fault = null;
 
@@ -21,9 +19,7 @@ export function tellRest(text) {
 
 /** Say what has changed; it fades, but for what `stays`. @param {string} text */
 export function say(text, stays = false) {
-  const line = document.createElement("span");
-  line.textContent = text;
-  line.className = stays ? "stays" : "";
+  const line = element("span", { textContent: text, className: stays ? "stays" : "" });
   said.replaceChildren(line); // a new element: read aloud and faded anew
 }
 

@@ -1,7 +1,9 @@
 // Mirrored views of planar reflectors: lambent/realtime/planar/{planar_view,reflector_faces}.py in JavaScript. A view's
 // buffer shows the whole frame; what of it a camera needs is a rectangle, not a smaller buffer.
 
-/** @typedef {import("./camera.js").Vector} Vector */
+import { along, clamp, dot } from "./vectors.js";
+
+/** @import { Vector } from "./vectors.js" */
 /** @typedef {ReturnType<typeof import("./camera.js").frameOf>} FrameFields */
 /** @typedef {{plane: number[], outline: Vector[], twoSided: boolean, deviationM: number, plan: any}} Reflector */
 /** @typedef {{number: number, upright: boolean, frame: any, view: any, plan: any, clip: number[][], rectangle: number[]}} View */
@@ -14,18 +16,9 @@ const MARGIN_PX = 16,
 const CLEARANCE = 1e-5,
   LEAST_SHARE = 2e-4,
   LEAST_W = 1e-6;
-const SIDES = [
-  [0, 0, 1],
-  [1, 0, 1],
-  [-1, 0, 1],
-  [0, 1, 1],
-  [0, -1, 1],
-];
 
-/** @param {ArrayLike<number>} a @param {ArrayLike<number>} b */
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-/** @param {Vector} a @param {Vector} b @param {number} s @returns {Vector} a + s b */
-const along = (a, b, s) => [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
+/** How far a corner is within the frame's planes, by which polygons are cut one by one. @param {number[]} corner (x, y, w) */
+const withinSides = ([x, y, w]) => [w - LEAST_W, w + x, w - x, w + y, w - y];
 
 /** Size of a buffer for a frame, and the frame's first pixel in it. @param {number[]} size */
 export function wholeWindow(size) {
@@ -42,8 +35,8 @@ function onScreen(points, first, count, clip) {
     const p = [points[3 * i], points[3 * i + 1], points[3 * i + 2]];
     polygon.push([0, 1, 3].map((row) => dot(clip[row], p) + clip[row][3]));
   }
-  for (const side of SIDES) {
-    const heights = polygon.map((p) => dot(side, p) - (side === SIDES[0] ? LEAST_W : 0));
+  for (const side of [0, 1, 2, 3, 4]) {
+    const heights = polygon.map((corner) => withinSides(corner)[side]);
     if (heights.every((height) => height > 0)) continue;
     const kept = [];
     for (let i = 0; i < polygon.length; i++) {
@@ -132,8 +125,7 @@ export function viewOf(one, plane, frame, size, order) {
   const n = /** @type {Vector} */ (plane.slice(0, 3)),
     d = plane[3],
     { wide, offset } = wholeWindow(size);
-  /** @param {Vector} v @returns {Vector} */
-  const turned = (v) => along(v, n, -2 * dot(n, v));
+  const turned = (/** @type {Vector} */ v) => along(v, n, -2 * dot(n, v));
   const scale = [0, 1].map((i) => size[i] / wide[i]),
     shift = [0, 1].map((i) => (size[i] + 2 * offset[i] - wide[i]) / wide[i]);
   const clip = frame.rows.map((row) => [...turned(/** @type {any} */ (row)), row[3] - 2 * d * dot(row, n)]);
@@ -199,11 +191,11 @@ function rectangleOf(one, m, frame, size) {
   const shown = onScreen(one.outline.flat(), 0, one.outline.length, frame.rows);
   const places = shown.map(([x, y]) => [((x + 1) / 2) * size[0] + offset[0], ((1 - y) / 2) * size[1] + offset[1]]);
   if (!places.length) return [0, 0, ...wide];
-  const ends = [0, 1].map((i) => {
-    const along = places.map((place) => place[i]);
-    return [Math.floor(Math.min(...along) - reach), Math.ceil(Math.max(...along) + reach)].map((px) =>
-      Math.min(Math.max(px, 0), wide[i]),
-    );
+  const [[x, right], [y, below]] = [0, 1].map((i) => {
+    const at = places.map((place) => place[i]);
+    const first = Math.floor(Math.min(...at) - reach),
+      last = Math.ceil(Math.max(...at) + reach);
+    return [clamp(first, 0, wide[i]), clamp(last, 0, wide[i])];
   });
-  return [ends[0][0], ends[1][0], ends[0][1] - ends[0][0], ends[1][1] - ends[1][0]];
+  return [x, y, right - x, below - y];
 }

@@ -1,6 +1,6 @@
 // Rays against the triangles of the room: lambent/viewer/cameras/picking.py, and its floors as views/walls.py.
 
-/** @typedef {import("./camera.js").Vector} Vector */
+/** @import { Vector } from "./vectors.js" */
 /** @typedef {{name: string, material: string, first: number, count: number, bounds: [Vector, Vector]}} Thing */
 /** @typedef {{thing: Thing | null, m: number, face: number}} Hit distance in m, Infinity for none */
 

@@ -4,13 +4,16 @@ import { addressOf, cameraAddress, readAddress } from "./address.js";
 import * as c from "./camera.js";
 import { failed, say, tellRest } from "./messages.js";
 import { glide, isFloor, standingAt, turned } from "./moves.js";
+import { along, minus } from "./vectors.js";
 
-/** @typedef {c.Camera} Camera */
-/** @typedef {c.Vector} Vector */
-/** @typedef {import("./frame.js").Frame} Frame */
-/** @typedef {import("./loading.js").Data} Data */
-/** @typedef {import("./picking.js").Geometry} Geometry */
-/** @typedef {import("./picking.js").Hit & {thing: import("./picking.js").Thing, place: Vector, onFloor: boolean}} Found */
+/** @import { Camera } from "./camera.js" */
+/** @import { Frame } from "./frame.js" */
+/** @import { Lights } from "./lights.js" */
+/** @import { Data } from "./loading.js" */
+/** @import { Motion } from "./moves.js" */
+/** @import { Geometry, Hit, Thing } from "./picking.js" */
+/** @import { Bounds, Vector } from "./vectors.js" */
+/** @typedef {Hit & {thing: Thing, place: Vector, onFloor: boolean}} Found */
 
 export const FAST = 3; // times the pace
 const LARGE = 0.5, // radius / distance of things that orbit turns about the clicked point of, not about their middle
@@ -19,37 +22,31 @@ const LARGE = 0.5, // radius / distance of things that orbit turns about the cli
 
 /** Fires `change` when what panel and card show has changed, `shown` after each frame, `light` when an address brings one. */
 export class Visit extends EventTarget {
+  /** @type {Frame | null} */ frame = null;
+  /** @type {Data | null} */ data = null;
+  /** @type {Geometry | null} */ geometry = null;
+  /** @type {Lights | null} */ lights = null;
+  /** @type {Found | null} what was clicked */ found = null;
+  /** @type {Vector | null} the centre of orbit; null on foot */ pivot = null;
+  /** @type {Motion | null} */ motion = null;
+  /** @type {Set<string>} keys */ held = new Set();
+  fast = 1;
+  lastMs = 0;
+  requested = false;
+  frames = 0;
+
   /** @param {any} manifest @param {HTMLCanvasElement} canvas */
   constructor(manifest, canvas) {
     super();
     this.manifest = manifest;
     this.canvas = canvas;
-    /** @type {Frame | null} */
-    this.frame = null;
-    /** @type {Data | null} */
-    this.data = null;
+    this.bounds = /** @type {Bounds} */ (manifest.bounds);
     const { camera, state, exposureEv, viewTransform, light } = readAddress(location.hash, manifest);
     this.camera = camera;
     this.state = state;
     this.exposureEv = exposureEv;
     this.viewTransform = viewTransform;
     this.light = light;
-    /** @type {import("./lights.js").Lights | null} */
-    this.lights = null;
-    /** @type {Found | null} */
-    this.found = null;
-    /** @type {Vector | null} the centre of orbit; null on foot */
-    this.pivot = null;
-    /** @type {import("./moves.js").Motion | null} */
-    this.motion = null;
-    /** @type {Set<string>} keys */
-    this.held = new Set();
-    this.fast = 1;
-    /** @type {Geometry | null} */
-    this.geometry = null;
-    this.lastMs = 0;
-    this.requested = false;
-    this.frames = 0;
   }
 
   /** Show the room by a frame and its data. @param {Frame} frame @param {Data} data */
@@ -101,41 +98,39 @@ export class Visit extends EventTarget {
       if (motion.timeS < motion.seconds) this.touch();
       else this.stop();
     } else if (this.held.size) {
-      this.step([...this.held], dtS, this.fast);
+      this.step(c.pushOf(this.held), dtS, this.fast);
     }
   }
 
-  /** Walk, or nearer and around in orbit. @param {string[]} keys @param {number} dtS @param {number} fast @param {[number, number]} stick */
-  step(keys, dtS, fast = 1, stick = [0, 0]) {
-    const { camera, pivot } = this,
-      { bounds } = this.manifest;
-    if (pivot) {
-      const [right, forward] = c.pushOf(keys, stick);
-      if (right) this.turn(-PAD_PX_S * dtS * right, 0);
-      if (forward) this.zoom(PAD_NOTCHES_S * dtS * forward);
-      return;
+  /** Walk, or nearer and around in orbit. @param {[number, number]} push right, forward @param {number} dtS @param {number} fast */
+  step(push, dtS, fast = 1) {
+    const { camera, bounds } = this;
+    if (this.pivot) {
+      this.turn(-PAD_PX_S * dtS * push[0], 0);
+      this.zoom(PAD_NOTCHES_S * dtS * push[1]);
+    } else {
+      const floorY = this.geometry?.floorBelow(camera.position, c.eyeHeightOf(bounds));
+      this.go(c.walk(camera, push, dtS, bounds, fast, floorY));
     }
-    const floorY = this.geometry?.floorBelow(camera.position, c.eyeHeightOf(bounds));
-    this.go(c.walk(camera, keys, dtS, bounds, fast, stick, floorY));
   }
 
   /** Look around, or turn about the centre of orbit. @param {number} dx px @param {number} dy px */
   turn(dx, dy) {
-    const { camera, pivot, geometry } = this;
-    this.go(pivot ? turned(camera, dx, dy, pivot, this.manifest.bounds, geometry) : c.look(camera, dx, dy));
+    const { camera, pivot, bounds, geometry } = this;
+    this.go(pivot ? turned(camera, dx, dy, pivot, bounds, geometry) : c.look(camera, dx, dy));
   }
 
   /** @param {number} steps of the wheel */
   zoom(steps) {
-    if (this.pivot) this.go(c.zoom(this.camera, steps, this.manifest.bounds, this.pivot));
+    if (this.pivot) this.go(c.zoom(this.camera, steps, this.bounds, this.pivot));
   }
 
   /** Steer by a gamepad. @param {import("./gamepad.js").Pad} pad @param {number} dtS */
   steer({ left, right, slower, faster }, dtS) {
     const turn = PAD_PX_S * dtS * (this.pivot ? -1 : 1);
     this.stop();
-    if (right[0] || right[1]) this.turn(turn * right[0], -turn * right[1]);
-    if (left[0] || left[1]) this.step([], dtS, FAST ** (faster - slower), this.pivot ? [0, left[1]] : left);
+    this.turn(turn * right[0], -turn * right[1]);
+    this.step(this.pivot ? [0, left[1]] : left, dtS, FAST ** (faster - slower));
   }
 
   /** @param {Camera} camera */
@@ -151,7 +146,7 @@ export class Visit extends EventTarget {
     this.changed();
   }
 
-  /** @param {import("./moves.js").Motion} motion */
+  /** @param {Motion} motion */
   play(motion) {
     this.motion = motion;
     this.pivot = null;
@@ -171,13 +166,9 @@ export class Visit extends EventTarget {
     const towards = c.rayThrough(camera, x, y, canvas.clientWidth, canvas.clientHeight),
       hit = geometry?.hit(camera.position, towards);
     if (!geometry || !hit?.thing) return null;
-    const place = c.along(camera.position, towards, hit.m);
-    return {
-      ...hit,
-      thing: hit.thing,
-      place,
-      onFloor: isFloor(camera, place, hit.face, geometry, this.manifest.bounds),
-    };
+    const place = along(camera.position, towards, hit.m),
+      onFloor = isFloor(camera, place, hit.face, geometry, this.bounds);
+    return { ...hit, thing: hit.thing, place, onFloor };
   }
 
   /** @param {Found | null} found */
@@ -188,8 +179,7 @@ export class Visit extends EventTarget {
 
   /** Walk to what was found. @param {Found} found */
   goTo({ place, onFloor }) {
-    const { camera, geometry } = this,
-      { bounds } = this.manifest;
+    const { camera, geometry, bounds } = this;
     if (!geometry) return;
     const end = standingAt(camera, place, onFloor, geometry, bounds);
     if (matchMedia("(prefers-reduced-motion: reduce)").matches) return this.view(end);
@@ -203,8 +193,8 @@ export class Visit extends EventTarget {
     if (this.pivot || !found) this.pivot = this.pivot ? null : camera.target;
     else {
       const [low, high] = found.thing.bounds,
-        isLarge = Math.hypot(...c.minus(high, low)) / 2 > LARGE * found.m;
-      this.pivot = isLarge ? found.place : c.along(low, c.minus(high, low), 0.5);
+        isLarge = Math.hypot(...minus(high, low)) / 2 > LARGE * found.m;
+      this.pivot = isLarge ? found.place : along(low, minus(high, low), 0.5);
     }
     this.changed();
   }
