@@ -19,6 +19,15 @@ settings.load_profile("unhurried")
 SHARED = Path(os.environ.get("LAMBENT_SHARED", Path(__file__).parents[2] / "shared" / "data"))
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--long", action="store_true", help="Run tests that take minutes, too.")
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    if item.get_closest_marker("long") and not item.config.getoption("--long"):
+        pytest.skip("takes minutes with its like: pytest --long runs them")
+
+
 @pytest.fixture(scope="session", autouse=True)
 def settings_of_no_user(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Windows of tests start as on a new computer, and leave the user's own settings alone."""

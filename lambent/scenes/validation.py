@@ -8,9 +8,14 @@ from numpy.typing import NDArray
 from lambent.core.geometry.directions import Floats
 from lambent.core.geometry.triangles import area_vectors, cross_2d, triangle_areas
 from lambent.scenes.first_view import content_bounds
+from lambent.scenes.mesh import boxes_of
 from lambent.scenes.scene import Mesh, Scene
 
 LARGE, SMALL = 500.0, 0.05  # metres
+THING_M, THINGS = (
+    20.0,
+    3,
+)  # half of the objects of rooms in metres are smaller than 2 m, of rooms in centimetres than 200
 
 
 def validate(scene: Scene) -> list[str]:
@@ -35,7 +40,7 @@ def validate(scene: Scene) -> list[str]:
 
 
 def size_warnings(scene: Scene) -> list[str]:
-    """A warning if the extent of what stands in the scene suggests another unit than the metre.
+    """A warning if the extent of what stands in the scene, or of most objects, suggests another unit than the metre.
 
     Grounds and skies that dwarf all else may be as large as they like.
     """
@@ -43,9 +48,13 @@ def size_warnings(scene: Scene) -> list[str]:
     if (high - low).max() > LARGE:
         low, high = content_bounds(scene.objects)
     extent = float((high - low).max())
-    if SMALL <= extent <= LARGE:
-        return []
-    return [f"the scene is {_metres(extent)} m large: is its unit the metre? (scene.toml can scale a geometry file)"]
+    thing = float(np.median(np.ptp(boxes_of([o.mesh for o in scene.objects]), axis=1).max(axis=1)))
+    question = "is its unit the metre? (scene.toml can scale a geometry file)"
+    if not SMALL <= extent <= LARGE:
+        return [f"the scene is {_metres(extent)} m large: {question}"]
+    if thing > THING_M and len(scene.objects) >= THINGS:
+        return [f"half of the objects are larger than {_metres(thing)} m: {question}"]
+    return []
 
 
 def _metres(extent: float) -> str:

@@ -25,6 +25,7 @@ from lambent.scenes import builtin, loaders
 from lambent.scenes.loaders.blender import BLEND, exported
 from lambent.scenes.loaders.contents import Contents, LoadOptions
 from lambent.scenes.loaders.meshes.flush import with_flush_raised
+from lambent.scenes.loaders.meshes.inverted import with_lamps_outwards
 from lambent.scenes.loaders.meshes.repair import box_mapped, deviation_warnings, with_creases
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.document import load_toml
@@ -34,6 +35,7 @@ from lambent.scenes.validation import size_warnings
 
 TOML = ".toml"
 TOLD = 2  # objects named individually in warnings of one kind
+CALLED = {"material", "picture", "light", "camera"}  # what warnings call things that are not objects
 
 
 def load_scene(path_or_builtin: str | Path, crease_deg: float | None = None) -> Scene:
@@ -59,7 +61,7 @@ def load_scene(path_or_builtin: str | Path, crease_deg: float | None = None) -> 
         return replace(scene, warnings=(*lost, *scene.warnings))
     scene, text = _load(path_or_builtin, crease_deg), str(path_or_builtin)
     origin = text if text.startswith(BUILTIN_PREFIX) else os.path.abspath(text)
-    scene = with_uv(with_luminous_surfaces(scene))
+    scene = with_uv(with_luminous_surfaces(with_lamps_outwards(scene)))
     angle = scene.crease_deg if crease_deg is None else crease_deg
     if angle is not None:
         scene = replace(scene, objects=with_creases(scene.objects, angle), crease_deg=angle)
@@ -98,10 +100,16 @@ def counted(warnings: Sequence[str]) -> list[str]:
         shared.setdefault(what, []).append(name)
     told = dict.fromkeys(
         warning if not (what := warning.partition(": ")[2]) or len(shared[what]) <= TOLD
-        else f"{len(shared[what])} objects: {what} ({', '.join(shared[what][:TOLD])}, ...)"
+        else f"{_number_of(shared[what])}: {what} ({', '.join(shared[what][:TOLD])}, ...)"
         for warning in warnings
     )  # fmt: skip
     return list(told)
+
+
+def _number_of(names: Sequence[str]) -> str:
+    """How many there are, and of what, if their names say it: "3 materials"."""
+    kinds = {name.partition(" ")[0] for name in names}
+    return f"{len(names)} {kinds.pop() if len(kinds) == 1 and kinds <= CALLED else 'object'}s"
 
 
 def _load(path_or_builtin: str | Path, crease_deg: float | None) -> Scene:

@@ -158,6 +158,9 @@ def test_warnings_that_many_objects_share_are_one_with_a_count() -> None:
     assert told == [
         "the sun is low", "40 objects: no uv: box-mapped (chair_0, chair_1, ...)", "lamp: no normals", "leg: no normals"
     ]  # fmt: skip
+    assert counted([f"material {i}: clipped to 1" for i in range(3)]) == [
+        "3 materials: clipped to 1 (material 0, material 1, ...)"
+    ]
 
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 1 1 0\n"

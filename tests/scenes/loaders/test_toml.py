@@ -298,6 +298,8 @@ def test_materials_are_assigned_by_pattern(tmp_path: Path) -> None:
     ]
     over = load_scene(written(tmp_path, ASSIGN + '[objects.sphere]\nmaterial = "black"\n'))
     assert over.object("sphere").material == "black"
+    idle = load_scene(written(tmp_path, ASSIGN + '"Oak*" = "metal"\n'))
+    assert "assign.Wood* and assign.Oak* match no object and no material: see" in "\n".join(idle.warnings)
     near = load_scene(written(tmp_path, MATERIALS + '[assign]\nspher = "metal"\n'))
     assert "assign.spher matches no object and no material: did you mean 'sphere'?" in near.warnings
     named = load_scene(written(tmp_path, MATERIALS + '[materials."g*"]\nkd = 0.1\n'))

@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from lambent.core.errors import UserError, did_you_mean
-from lambent.core.plain import UniqueNames
+from lambent.core.plain import UniqueNames, first_of
 from lambent.materials.document import Material
 from lambent.scenes.loaders.contents import Contents
 from lambent.scenes.scene import MaterialTextures, SceneObject
@@ -68,7 +68,7 @@ def _own_names(
 def assigned(
     rules: Mapping[str, str], objects: Iterable[SceneObject], materials: Mapping[str, Material], path: Path
 ) -> tuple[tuple[SceneObject, ...], list[str]]:
-    """Objects with materials assigned by rules, and a warning for each rule that matches nothing.
+    """Objects with materials assigned by rules, and warnings about rules that match nothing.
 
     A rule is a pattern with * and ? over the names of objects and of their original materials; later ones win.
 
@@ -79,15 +79,19 @@ def assigned(
     """
     by_name = {o.name: o for o in objects}
     originals = {name: o.material for name, o in by_name.items()}
-    warnings = []
+    warnings, idle = [], []
     for pattern, material in rules.items():
         check_material(material, materials, path, f"assign.{pattern}")
         fits = [n for n, was in originals.items() if fnmatchcase(n, pattern) or fnmatchcase(was, pattern)]
         for name in fits:
             by_name[name] = replace(by_name[name], material=material)
-        if not fits:
-            hint = did_you_mean(pattern, [*originals.values(), *originals]) or NAMES_HINT
+        if not fits and (hint := did_you_mean(pattern, [*originals.values(), *originals])):
             warnings.append(f"assign.{pattern} matches no object and no material: {hint}")
+        elif not fits:
+            idle.append(f"assign.{pattern}")
+    if idle:
+        verb = "matches" if len(idle) == 1 else "match"
+        warnings.append(f"{first_of(idle)} {verb} no object and no material: {NAMES_HINT}")
     return tuple(by_name.values()), warnings
 
 

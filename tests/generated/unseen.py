@@ -1,0 +1,154 @@
+"""Scenes that users bring and that nothing here was tuned for, baked and compared by the commands that users type.
+
+    nice python -m tests.generated.unseen FOLDER [--only NAME] [--json FILE]
+
+Each is written, baked as a draft, drawn at rest and path traced with two seeds. FOLDER/NAME/row.json keeps its row;
+the same command does the rest, and `--only` again what it names. `--json` writes all to another file. A row is:
+
+- `outcome`: "baked", the one line that refuses it, or "fault: ..." for a traceback, a signal or too much time;
+- `bake_s`, processor time; `triangles`; `texels` of the light map; `warnings`, of which a person reads READABLE lines;
+- `flip` of the picture at rest against the mean of the path traced ones, `noise` between those, `worst_tile` and
+  `noise_tile`, of 16 x 16 pixels; `level`, their mean radiance over that of the paths; or `dark`, the largest radiance
+  where the paths find none. A scene holds if the means differ by at most MEAN and no tile exceeds TILE.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lambent.bench.measuring.reference import Truth
+from lambent.core.arrays import Floats
+from lambent.core.files import write_text
+from lambent.core.pictures import metrics
+from lambent.core.pictures.images import read_image
+from lambent.store.contract import scene_record
+from lambent.store.store import Store
+from tests.generated import cad, light, odd
+
+MEAN, TILE, READABLE = 0.02, 0.3, 8
+SIZE, PATHS, LONGEST_S, DONE = "192x108", 256, 3600, "done"
+UNSEEN: dict[str, Callable[[Path], Path]] = {
+    write.__name__: write
+    for write in (
+        cad.centimetres_glb, cad.centimetres_obj, cad.kitchen_in_metres, cad.broken, cad.names, cad.mirrored,
+        cad.millimetre, cad.doubled, cad.inside_out, cad.against_winding, cad.terrain, cad.ground_50km,
+        cad.cad_nodes, cad.million,
+        light.leak_1mm, light.leak_0mm, light.keyhole, light.shaded_lamp, light.ceiling_lamp, light.only_emissive,
+        light.no_light, light.candle, light.horizon_sun, light.low_sun, light.sun_below, light.overcast,
+        light.narrow_spot, light.sixty,
+        odd.flush, odd.uv_huge, odd.uv_zero, odd.uv_overlapping, odd.texture_8k, odd.texture_1, odd.albedo_one,
+        odd.mirror_box, odd.glass_stack, odd.camera_in_wall, odd.camera_down, odd.kd_over_one, odd.perfect_lobes,
+        odd.sharpest, odd.brushed, odd.gltf_extremes,
+    )
+}  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--only", action="append", choices=UNSEEN, metavar="NAME")
+    parser.add_argument("--json", type=Path)
+    said = parser.parse_args()
+    rows: dict[str, Any] = {}
+    for name in said.only or UNSEEN:
+        kept = said.folder / name / "row.json"
+        if said.only or not kept.exists():
+            kept.unlink(missing_ok=True)
+            write_text(kept, json.dumps(row(name, kept.parent), indent=1))
+        rows[name] = json.loads(kept.read_text("utf-8"))
+        print(in_words(name, rows[name]), flush=True)  # noqa: T201
+    if said.json:
+        write_text(said.json, json.dumps(rows, indent=1))
+
+
+def row(name: str, folder: Path) -> dict[str, Any]:
+    """Write a scene, bake it, and compare its pictures."""
+    shutil.rmtree(folder, ignore_errors=True)
+    scene, store = UNSEEN[name](folder / "scene"), folder / "baked.store"
+    outcome, bake_s = lambent(folder / "bake", "bake", scene, "-o", store, "--quality", "draft", "--json")
+    found: dict[str, Any] = {"outcome": outcome, "bake_s": round(bake_s, 1)}
+    if outcome != DONE:
+        return found
+    warnings = json.loads((folder / "bake.out").read_text())["warnings"]
+    arrays = Store.open(store)
+    height, width, _ = arrays.artefact("light_map/irradiance").shape
+    triangles = sum(o.face_count for o in scene_record(arrays).objects)
+    found |= {"outcome": "baked", "warnings": warnings, "triangles": triangles, "texels": height * width}
+    pictures = {"rest": (), "path_1": ("--seed", 1), "path_2": ("--seed", 2)}
+    for picture, seed in pictures.items():
+        path = ("--integrator", "path", "--samples", PATHS, "--no-denoise") if seed else ()
+        output = folder / f"{picture}.exr"
+        outcome, _ = lambent(folder / picture, "render", store, "--size", SIZE, "-o", output, *path, *seed)
+        if outcome != DONE:
+            return found | {"outcome": f"baked, but not drawn: {outcome}"}
+    return found | compared(*(read_image(folder / f"{picture}.exr") for picture in pictures))
+
+
+def lambent(log: Path, *arguments: object) -> tuple[str, float]:
+    """Run the command as a user does: DONE, its refusing line, or a fault; and the processor time, s.
+
+    What it prints is in LOG.out and LOG.err.
+    """
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    command = [sys.executable, "-m", "lambent", *map(str, arguments)]
+    with log.with_suffix(".out").open("wb") as out, log.with_suffix(".err").open("wb") as err:
+        try:
+            code = subprocess.run(command, stdout=out, stderr=err, timeout=LONGEST_S, check=False).returncode
+        except subprocess.TimeoutExpired:
+            code = None
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = sum(getattr(after, key) - getattr(before, key) for key in ("ru_utime", "ru_stime"))
+    said = log.with_suffix(".err").read_text("utf-8", "replace")
+    lines = [line for line in said.splitlines() if line.strip()]
+    if code == 0:
+        return DONE, seconds
+    if code == 2 and "Traceback" not in said:
+        return f"refused: {lines[-1]}", seconds
+    return f"fault: {'too slow' if code is None else f'code {code}, {lines[-1] if lines else str()}'}", seconds
+
+
+def compared(rest: Floats, *paths: Floats) -> dict[str, Any]:
+    """Errors of the picture at rest (H, W, 3), and between paths; its largest value if those are dark."""
+    if not np.mean(paths) > 0:
+        return {"dark": float(rest.max())}
+    truth = Truth.of(paths)
+    between = metrics.flip_error(*map(truth.shown, paths))
+    errors = truth.errors(rest)
+    return {
+        "flip": errors["flip"], "noise": truth.noise, "worst_tile": errors["flip_worst_tile"],
+        "noise_tile": round(float(metrics.tile_means(between).max()), 4),
+        "level": round(float(rest.mean() / np.mean(paths)), 3),
+    }  # fmt: skip
+
+
+def misses(found: dict[str, Any]) -> list[str]:
+    """What a row fails in."""
+    said = [found["outcome"]] if not found["outcome"].startswith(("baked", "refused: ")) else []
+    said += [found["outcome"]] if "not drawn" in found["outcome"] else []
+    warnings = found.get("warnings", [])
+    said += ["warnings"] if len(warnings) > READABLE or len(set(warnings)) < len(warnings) else []
+    if "flip" in found:
+        said += ["flip"] if found["flip"] > found["noise"] + MEAN else []
+        said += ["tile"] if found["worst_tile"] > TILE else []
+    return said + (["not dark"] if found.get("dark", 0) > 0 else [])
+
+
+def in_words(name: str, found: dict[str, Any]) -> str:
+    figures = [f"{key} {found[key]}" for key in ("bake_s", "triangles", "texels", "flip", "noise", "worst_tile",
+                                                 "noise_tile", "level", "dark") if key in found]  # fmt: skip
+    lines = [f"{name}: {found['outcome']}; {', '.join(figures)}", *(f"    {one}" for one in found.get("warnings", []))]
+    return "\n".join([*lines, *(f"    MISS {one}" for one in misses(found))])
+
+
+if __name__ == "__main__":
+    main()

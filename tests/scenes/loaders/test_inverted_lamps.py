@@ -1,0 +1,56 @@
+"""Closed lamps whose faces look inwards are turned outwards, rooms that shine are not; other units are asked for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from lambent.core.views.camera import Camera
+from lambent.scenes.geometry import box, patch, placed, transformed
+from lambent.scenes.loaders.meshes.inverted import shines_inwards, with_lamps_outwards
+from lambent.scenes.scene import Scene, SceneObject
+from lambent.scenes.validation import size_warnings
+from tests.baking.small_scenes import GREY, furnace, turned_inwards
+
+FLOOR = SceneObject("floor", patch((-1, 0, 1), (2, 0, 0), (0, 0, -2)), "grey")
+LAMP = SceneObject("lamp", placed(turned_inwards(box((0.2, 0.2, 0.2))), (0, 1, 0)), "grey", emission=(1, 1, 1))
+
+
+def scene_of(*objects: SceneObject) -> Scene:
+    return Scene("lit", objects, {"grey": GREY})
+
+
+def test_a_lamp_is_turned_outwards_and_named() -> None:
+    scene = with_lamps_outwards(scene_of(FLOOR, LAMP))
+    mesh = scene.object("lamp").mesh
+    away = mesh.positions - mesh.positions.mean(axis=0)
+    assert ((mesh.normals * away).sum(axis=1) > 0).all()
+    assert not shines_inwards(mesh)
+    assert scene.object("floor") is FLOOR
+    assert "faces of lamp look inwards" in scene.warnings[-1]
+
+
+def test_against_the_winding_too() -> None:
+    mesh = replace(LAMP.mesh, faces=np.ascontiguousarray(LAMP.mesh.faces[:, ::-1]))
+    assert shines_inwards(mesh)
+    assert not shines_inwards(replace(mesh, normals=-mesh.normals))
+
+
+def test_what_shines_into_a_room_stays() -> None:
+    room = replace(furnace().objects[0], mesh=placed(furnace().objects[0].mesh, (0, 0.5, 0)))
+    thing = SceneObject("thing", box((0.1, 0.1, 0.1)), "grey")
+    looked_at = replace(scene_of(room), cameras=(Camera("view", (0, 0, 0.5), (0, 0, 0)),))
+    for scene in (scene_of(room, thing), looked_at, scene_of(FLOOR), scene_of(replace(LAMP, mesh=FLOOR.mesh), thing)):
+        assert with_lamps_outwards(scene) is scene
+
+
+def test_a_room_in_centimetres_is_asked_about() -> None:
+    """Its extent could be that of a village, the sizes of its things could not."""
+    sides = (360, 300, 250, 120, 90)
+    room = scene_of(*(SceneObject(f"part_{side}", box((side, side / 2, 5)), "grey") for side in sides))
+    assert "half of the objects are larger than 250 m: is its unit the metre?" in size_warnings(room)[0]
+    metres = replace(
+        room, objects=tuple(replace(o, mesh=transformed(o.mesh, np.diag([0.01] * 3 + [1]))) for o in room.objects)
+    )
+    assert not size_warnings(metres)
