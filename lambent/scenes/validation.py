@@ -12,6 +12,7 @@ from lambent.scenes.mesh import boxes_of
 from lambent.scenes.scene import Mesh, Scene
 
 LARGE, SMALL = 500.0, 0.05  # metres
+ALL_LIGHT = 1.001  # diffuse reflectance; fits and conversions round
 THING_M, THINGS = (
     20.0,
     3,
@@ -55,6 +56,17 @@ def size_warnings(scene: Scene) -> list[str]:
     if thing > THING_M and len(scene.objects) >= THINGS:
         return [f"half of the objects are larger than {_metres(thing)} m: {question}"]
     return []
+
+
+def reflectance_warnings(scene: Scene) -> list[str]:
+    """A warning for each material of an object whose diffuse terms alone reflect more light than arrives."""
+    used = dict.fromkeys(o.material for o in scene.objects)
+    shares = {name: float(np.max(np.add(m.kd, m.kt_d))) for name in used if (m := scene.materials.get(name))}
+    return [
+        f"material {name}: reflects more light than arrives ({share:.3g}): light grows from surface to surface"
+        for name, share in shares.items()
+        if share > ALL_LIGHT
+    ]
 
 
 def _metres(extent: float) -> str:

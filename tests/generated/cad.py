@@ -112,11 +112,30 @@ def millimetre(folder: Path) -> Path:
 
 def million(folder: Path) -> Path:
     """Over 1,000,000 triangles in a room: thirteen dense statues."""
-    room = Room(Look("million", more=lamp())).furnish()
+    return _statues(folder, "million", 6)
+
+
+def statues_1k(folder: Path) -> Path:
+    """The same room with fewer triangles."""
+    return _statues(folder, "statues_1k", 1)
+
+
+def statues_17k(folder: Path) -> Path:
+    """With 17,000."""
+    return _statues(folder, "statues_17k", 3)
+
+
+def statues_266k(folder: Path) -> Path:
+    """With 266,000."""
+    return _statues(folder, "statues_266k", 5)
+
+
+def _statues(folder: Path, name: str, subdivisions: int) -> Path:
+    room = Room(Look(name, more=lamp())).furnish(ball=min(subdivisions, 4))
     panel(room.add)
     rng = default_rng(3)
     for number in range(13):
-        statue = icosphere(6, 0.16)
+        statue = icosphere(subdivisions, 0.16)
         bumps = 1 + 0.15 * np.sin(9 * statue.vertices / 0.16 + rng.uniform(0, 6, 3)).prod(axis=1, keepdims=True)
         statue.vertices *= bumps
         at = (-1.6 + 0.55 * (number % 4), 0.2, -2.0 + 0.6 * (number // 4))

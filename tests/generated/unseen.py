@@ -42,7 +42,7 @@ UNSEEN: dict[str, Callable[[Path], Path]] = {
     for write in (
         cad.centimetres_glb, cad.centimetres_obj, cad.kitchen_in_metres, cad.broken, cad.names, cad.mirrored,
         cad.millimetre, cad.doubled, cad.inside_out, cad.against_winding, cad.terrain, cad.ground_50km,
-        cad.cad_nodes, cad.million,
+        cad.cad_nodes, cad.million, cad.statues_1k, cad.statues_17k, cad.statues_266k,
         light.leak_1mm, light.leak_0mm, light.keyhole, light.shaded_lamp, light.ceiling_lamp, light.only_emissive,
         light.no_light, light.candle, light.horizon_sun, light.low_sun, light.sun_below, light.overcast,
         light.narrow_spot, light.sixty,

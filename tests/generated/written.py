@@ -67,12 +67,12 @@ class Room:
     def add(self) -> Add:
         return adding_to(self.scene)
 
-    def furnish(self) -> Room:
-        """A room of 4 m by 5 m and 2.6 m high, with a table, a ball on it, and a box."""
+    def furnish(self, ball: int = 4) -> Room:
+        """A room of 4 m by 5 m and 2.6 m high, with a table, a ball of 20 x 4^`ball` triangles on it, and a box."""
         shell(self.add, 2.0, 2.5, 2.6)
         self.add(between((-0.7, 0.7, -0.4), (0.7, 0.74, 0.4)), "wood_top", (-0.4, 0, -0.8), 20)
         self.add(between((-0.2, 0, -0.2), (0.2, 0.7, 0.2)), "steel_leg", (-0.4, 0, -0.8), 20)
-        self.add(icosphere(4, 0.18), "steel_ball", (-0.3, 0.921, -0.7))
+        self.add(icosphere(ball, 0.18), "steel_ball", (-0.3, 0.921, -0.7))
         self.add(between((-0.25, 0, -0.25), (0.25, 0.6, 0.25)), "red_box", (1.1, 0, -1.2), -15)
         return self
 

@@ -31,7 +31,7 @@ from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.document import load_toml
 from lambent.scenes.photometry.luminous_surfaces import with_luminous_surfaces
 from lambent.scenes.scene import MaterialTextures, Mesh, Scene, SceneObject
-from lambent.scenes.validation import size_warnings
+from lambent.scenes.validation import reflectance_warnings, size_warnings
 
 TOML = ".toml"
 TOLD = 2  # objects named individually in warnings of one kind
@@ -66,7 +66,8 @@ def load_scene(path_or_builtin: str | Path, crease_deg: float | None = None) -> 
     if angle is not None:
         scene = replace(scene, objects=with_creases(scene.objects, angle), crease_deg=angle)
     notes = deviation_warnings(scene.objects) if angle is None else []
-    scene = replace(scene, warnings=(*counted(scene.warnings), *notes, *size_warnings(scene)), origin=origin)
+    told = counted([*scene.warnings, *reflectance_warnings(scene)])
+    scene = replace(scene, warnings=(*told, *notes, *size_warnings(scene)), origin=origin)
     return with_flush_raised(scene)
 
 

@@ -1,4 +1,4 @@
-"""Closed lamps whose faces look inwards are turned outwards, rooms that shine are not; other units are asked for."""
+"""Closed lamps whose faces look inwards are turned outwards, rooms that shine are not; other units and impossible materials are told."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from lambent.core.views.camera import Camera
 from lambent.scenes.geometry import box, patch, placed, transformed
 from lambent.scenes.loaders.meshes.inverted import shines_inwards, with_lamps_outwards
 from lambent.scenes.scene import Scene, SceneObject
-from lambent.scenes.validation import size_warnings
+from lambent.scenes.validation import reflectance_warnings, size_warnings
 from tests.baking.small_scenes import GREY, furnace, turned_inwards
 
 FLOOR = SceneObject("floor", patch((-1, 0, 1), (2, 0, 0), (0, 0, -2)), "grey")
@@ -54,3 +54,10 @@ def test_a_room_in_centimetres_is_asked_about() -> None:
         room, objects=tuple(replace(o, mesh=transformed(o.mesh, np.diag([0.01] * 3 + [1]))) for o in room.objects)
     )
     assert not size_warnings(metres)
+
+
+def test_a_material_that_makes_light_is_named() -> None:
+    scene = scene_of(FLOOR)
+    assert not reflectance_warnings(scene)
+    bright = replace(scene, materials={"grey": GREY.model_copy(update={"kd": (0.9, 0.2, 0.2), "kt_d": (0.5, 0, 0)})})
+    assert "material grey: reflects more light than arrives (1.4)" in reflectance_warnings(bright)[0]
