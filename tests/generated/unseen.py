@@ -67,6 +67,7 @@ def main() -> None:
             write_text(kept, json.dumps(row(name, kept.parent), indent=1))
         rows[name] = json.loads(kept.read_text("utf-8"))
         print(in_words(name, rows[name]), flush=True)  # noqa: T201
+    print("\n".join(table(rows)))  # noqa: T201
     if said.json:
         write_text(said.json, json.dumps(rows, indent=1))
 
@@ -141,6 +142,18 @@ def misses(found: dict[str, Any]) -> list[str]:
         said += ["flip"] if found["flip"] > found["noise"] + MEAN else []
         said += ["tile"] if found["worst_tile"] > TILE else []
     return said + (["not dark"] if found.get("dark", 0) > 0 else [])
+
+
+def table(rows: dict[str, Any]) -> list[str]:
+    """A line for each scene: FLIP at rest and noise, worst tile, seconds of its bake, and what it misses."""
+    lines = ["scene               FLIP / noise  tile  bake s"]
+    for name, found in rows.items():
+        if "flip" in found:
+            figures = f"{found['flip']:.3f} / {found['noise']:.3f}   {found['worst_tile']:.2f}   {found['bake_s']:.0f}"
+        else:
+            figures = "dark, as it should be" if found.get("dark") == 0 else found["outcome"].partition(":")[0]
+        lines.append(f"{name:18}  {figures:27}  {', '.join(misses(found))}".rstrip())
+    return lines
 
 
 def in_words(name: str, found: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""Closed lamps whose faces look inwards are turned outwards, rooms that shine are not; other units and impossible materials are told."""
+"""Lamps that look inwards are turned, rooms that shine are not; other units and impossible materials are told."""
 
 from __future__ import annotations
 
