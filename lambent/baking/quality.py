@@ -42,7 +42,7 @@ class Quality:
 
 DRAFT = Quality(QualityName.draft).changed(
     geometry={"texels": 192},
-    light_map={"samples": (16, 16), "noise": 0.5, "max_depth": 6, "gather_samples": 64},
+    light_map={"samples": (16, 16), "noise": 0.5, "gather_samples": 64},
     environment={"texels": 128},
     probe={"texels": 64, "samples": 8},
 )

@@ -176,6 +176,8 @@ SCENE: Answers = {
     "crease_deg": (30.0, NOTHING),  # the meshes have it already
     "sources": ((Path("other.toml"),), NOTHING),
     "warnings": (("a face is missing",), NOTHING),
+    "caption": ("A house by the lake", NOTHING),
+    "credit": ("Anna Weber", NOTHING),
     "probe_planes": (lambda planes: {name: 2 * plane for name, plane in planes.items()}, ("probe/ball/planes", SHARES)),
     "probe_centres": ({"ball": (0.0, 1.0, 0.2)}, OF_BALL),
     "light_fields": ({"ball": LightFieldWish(), "other ball": LightFieldWish()}, FIELDS),
