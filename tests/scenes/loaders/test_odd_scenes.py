@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
+from lambent.core.geometry.triangles import triangle_normals
 from lambent.core.views.camera import Camera
 from lambent.scenes.geometry import box, patch, placed, transformed
 from lambent.scenes.loaders.meshes.inverted import shines_inwards, with_lamps_outwards
+from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.scenes.validation import reflectance_warnings, size_warnings
 from tests.baking.small_scenes import GREY, furnace, turned_inwards
@@ -54,6 +57,21 @@ def test_a_room_in_centimetres_is_asked_about() -> None:
         room, objects=tuple(replace(o, mesh=transformed(o.mesh, np.diag([0.01] * 3 + [1]))) for o in room.objects)
     )
     assert not size_warnings(metres)
+
+
+def test_doubled_faces_are_dropped_and_normals_do_not_cancel() -> None:
+    """The file's normals are means of faces and their copies: none has a direction."""
+    solid = box((1, 1, 1))
+    twice = np.concatenate([solid.faces, solid.faces[:, ::-1]])
+    for normals in (None, np.zeros_like(solid.positions)):
+        mesh, notes = mesh_of(MeshArrays(solid.positions, twice, normals), name="box", file=Path("box.glb"))
+        assert mesh is not None and len(mesh.faces) == 12
+        assert np.abs((mesh.normals[mesh.faces] * triangle_normals(mesh.corners)[:, None]).sum(axis=2) - 1).max() < 1e-6
+        assert "box: 12 triangles dropped: doubled" in notes
+    apart = np.concatenate([solid.faces, solid.faces[:, ::-1] + len(solid.positions)])
+    both = MeshArrays(np.tile(solid.positions, (2, 1)), apart, np.concatenate([solid.normals, -solid.normals]))
+    kept, _ = mesh_of(both, name="sign", file=Path("sign.glb"))
+    assert kept is not None and len(kept.faces) == 24, "copies with normals of their own may shine on both sides"
 
 
 def test_a_material_that_makes_light_is_named() -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.arrays import Flags, Floats, Indices, hashes, sums_of
+from lambent.core.arrays import MIXERS, Flags, Floats, Indices, hashes, sums_of
 from lambent.core.errors import UserError
 from lambent.core.geometry.directions import basis, normalize
 from lambent.core.geometry.triangles import area_vectors, corner_angles, cross_2d, triangle_areas, triangle_normals
@@ -75,6 +75,7 @@ def mesh_of(
     faces = _usable(positions, faces, notes)
     if not len(faces):
         return None, [f"{name}: left out, no triangle has an area ({'; '.join(notes) or 'empty'})"]
+    faces = _once(positions, faces, normals is None, uv, notes)
     smoothed = crease_deg if normals is None else None
     if normals is None:  # every triangle gets its own vertices
         own = faces.reshape(-1)
@@ -126,6 +127,23 @@ def _usable(positions: Floats, faces: NDArray[np.integer], notes: list[str]) -> 
     if not wide.all():
         notes.append(f"{int((~wide).sum())} triangles dropped: no area")
     return faces[wide]
+
+
+def _once(
+    positions: Floats, faces: NDArray[np.integer], flat: bool, uv: Floats | None, notes: list[str]
+) -> NDArray[np.integer]:
+    """Faces without copies of others, turned round or not: surfaces are two-sided, and equal ones hide each other.
+
+    Copies have the same vertices; in `flat` meshes, which have no normals, vertices of equal position and uv count.
+    """
+    corners = faces.astype(np.int64)
+    if flat:
+        rows = hashes(positions) if uv is None else hashes(positions) + 3 * hashes(uv)
+        corners = np.unique(rows, return_inverse=True)[1].reshape(-1)[faces].astype(np.int64)
+    first = np.unique(np.sort(corners, axis=1) @ MIXERS[:3], return_index=True)[1]
+    if len(first) < len(faces):
+        notes.append(f"{len(faces) - len(first)} triangles dropped: doubled")
+    return faces[np.sort(first)]
 
 
 def _unit_normals(positions: Floats, faces: NDArray[np.integer], normals: Floats, notes: list[str]) -> Floats:
