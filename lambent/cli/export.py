@@ -36,10 +36,11 @@ def command(
 
     wanted = None if size is None else parse_size(size)
     made = export(store, output, as_=as_, size=wanted, views=view or (), note=note, progress=True)
-    rows = [(as_, str(output)), ("to transfer", f"{made['bytes'] / 1e6:.1f} MB in {made['files']} files")]
+    rows = [(as_, str(output)), ("to transfer", f"{made['bytes'] / 1e6:.1f} MB")]
     if as_ == "site":
+        rows.append(("folder", f"{made['folder_bytes'] / 1e6:.1f} MB in {made['files']} files of data"))
         memory = f"{made['graphics_bytes'] / 1e6:.0f} MB of graphics, {made['script_bytes'] / 1e6:.0f} MB of JavaScript"
         rows.append(("memory", memory))
         of_groups = [f"{name} {size / 1e6:.1f} MB" for name, size in made["by_light_group"].items()]
-        rows += [("of these, by slider", ", ".join(of_groups))] if of_groups else []
+        rows += [("more, by slider", ", ".join(of_groups))] if of_groups else []
     show(made, f"{table(rows)}\n\nto look at it: lambent serve {output}", json)

@@ -9,6 +9,7 @@ pictures, which lose a little.
 
 from __future__ import annotations
 
+import base64
 import gzip
 import hashlib
 import io
@@ -19,10 +20,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, features
 
 LEVEL = 9
-PICTURE_QUALITY = 90  # of WebP
+PICTURE_QUALITY, AVIF_QUALITY = 90, 88
+OPAQUE = 255
+INLINE = 1024  # packed bytes that stand in the manifest: a request costs more
 TALLEST_PX = 16383  # of WebP
 
 
@@ -60,11 +63,12 @@ class Chunks:
         self._folder = folder / "data"
         self._folder.mkdir(parents=True, exist_ok=True)
         self.files: dict[str, int] = {}  # bytes transferred, by name
+        self._added: dict[str, dict[str, Any]] = {}  # what `add` returned, by name
         self._pictures: dict[str, dict[str, Any]] = {}  # by the hash of their texels
 
     def add_picture(self, levels: Sequence[NDArray[np.uint8]]) -> dict[str, Any]:
-        """MIP levels (rows, columns, 4) of a picture, one below the other in a WebP file; alpha stays exact."""
-        tall = np.zeros((sum(len(level) for level in levels), levels[0].shape[1], 4), np.uint8)
+        """MIP levels (rows, columns, 4) of a picture, one below the other in a file; alpha stays exact."""
+        tall = np.full((sum(len(level) for level in levels), levels[0].shape[1], 4), OPAQUE, np.uint8)
         at = 0
         for level in levels:
             tall[at : at + len(level), : level.shape[1]] = level
@@ -75,11 +79,16 @@ class Chunks:
         return self._pictures[key]
 
     def _written(self, tall: NDArray[np.uint8]) -> dict[str, Any]:
-        made = io.BytesIO()
-        Image.fromarray(tall).save(made, "webp", quality=PICTURE_QUALITY, exact=True)
+        made, is_opaque = io.BytesIO(), bool((tall[..., 3] == OPAQUE).all())
+        if is_opaque and features.check("avif"):  # WebP halves the resolution of hues, AVIF has no exact alpha
+            form = "avif"
+            Image.fromarray(tall[..., :3]).save(made, form, quality=AVIF_QUALITY, subsampling="4:4:4")
+        else:
+            form = "webp"
+            Image.fromarray(tall).save(made, form, quality=PICTURE_QUALITY, exact=True)
         content = made.getvalue()
         digest = hashlib.sha256(content).hexdigest()
-        name = f"data/{digest[:20]}.webp"
+        name = f"data/{digest[:20]}.{form}"
         (self._folder.parent / name).write_bytes(content)
         self.files[name] = size = len(content)
         return {"file": name, "bytes": size, "packed": size, "sha256": digest, "picture": True}
@@ -88,9 +97,13 @@ class Chunks:
         """Where `data` is: a file relative to the site, bytes unpacked and packed, SHA-256, packing."""
         digest = hashlib.sha256(data).hexdigest()
         name = f"data/{digest[:20]}.gz"
-        if name not in self.files:
+        if name not in self._added:
             packed = gzip.compress(data if packing is None else packing.packed(data), LEVEL, mtime=0)
-            (self._folder.parent / name).write_bytes(packed)
-            self.files[name] = len(packed)
-        found = {"file": name, "bytes": len(data), "packed": self.files[name], "sha256": digest}
-        return found if packing is None else {**found, "packing": packing.said()}
+            found: dict[str, Any] = {"file": name, "bytes": len(data), "packed": len(packed), "sha256": digest}
+            if len(packed) <= INLINE:
+                found["inline"] = base64.b64encode(packed).decode()
+            else:
+                (self._folder.parent / name).write_bytes(packed)
+                self.files[name] = len(packed)
+            self._added[name] = found if packing is None else {**found, "packing": packing.said()}
+        return dict(self._added[name])

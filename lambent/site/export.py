@@ -30,7 +30,7 @@ from lambent.render.output import ignore
 from lambent.scenes.scene import Variant
 from lambent.site.cameras import cameras_of, frames_of, widest
 from lambent.site.manifest import Manifest, camel
-from lambent.site.memory import graphics_bytes, script_bytes
+from lambent.site.memory import graphics_bytes, script_bytes, transferred
 from lambent.site.mixing import mixing_of
 from lambent.site.things import things
 from lambent.store.kept.states import lamps_of, variants_of
@@ -41,7 +41,7 @@ from lambent.store.store import Store
 Note = Callable[[str], None]
 FORMAT, VERSION, UNFINISHED = "lambent-site", 1, 0
 SIZE = 640, 360  # of the frame that is described; the page's follows its canvas
-POSTER = 1280, 720  # a picture for browsers without WebGPU, and while the room loads
+POSTER = 960, 540  # a picture for browsers without WebGPU, and while the room loads
 DISPLAY, BAKED = "site", "as baked"
 
 
@@ -76,7 +76,8 @@ def export(store: Store, folder: Path, progress: Progress = silent, note: Note =
         exposure_ev = metered(renderer.image(state)) or 0.0
     _write_poster(renderer, replace(state, exposure_ev=exposure_ev), folder / "poster.jpg")
     shown = renderer.target(DISPLAY, SIZE).create_view()
-    manifest, states, rooms = Manifest(device, folder, SIZE, shown), [], list(_states(store, renderer, state, note))
+    manifest, states = Manifest(device, folder, SIZE, shown, in_blocks=baked.groups is None), []
+    rooms = list(_states(store, renderer, state, note))
     of_cameras, mixing = cameras_of(renderer, manifest, state), mixing_of(manifest, renderer, note)
     for room, now in tracked(rooms, progress, "states"):
         one = now()
@@ -97,7 +98,8 @@ def export(store: Store, folder: Path, progress: Progress = silent, note: Note =
     write_text(folder / "manifest.json", json.dumps(document, separators=(",", ":"), allow_nan=False))
     _copy_page(folder)
     return {
-        "written": folder, "bytes": sum(manifest.chunks.files.values()), "files": len(manifest.chunks.files),
+        "written": folder, "bytes": transferred(document), "files": len(manifest.chunks.files),
+        "folder_bytes": sum(manifest.chunks.files.values()),
         "pipelines": len(manifest.tables["render_pipeline"]), "graphics_bytes": graphics_bytes(manifest.tables),
         "script_bytes": script_bytes(document, len(baked.faces)),
         "by_light_group": mixing.bytes_of if mixing else {},

@@ -22,6 +22,7 @@ from lambent.realtime.gpu.described import DescribedDevice, Made
 from lambent.realtime.gpu.pipelines import VERTEX_FLOATS
 from lambent.realtime.gpu.read_back import BLOCKS, buffer_bytes, texel, texture_levels
 from lambent.realtime.planar.planar_view import whole_window
+from lambent.site.blocks import blocks_of
 from lambent.site.chunks import TALLEST_PX, Chunks, Packing
 from lambent.site.standins import LARGE, standin
 from lambent.site.vertices import UNITS, words_of
@@ -37,8 +38,14 @@ MIRROR = "mirror"  # for the size of buffers of mirrored views (`whole_window`)
 class Manifest:
     """Gathers what a frame is made of."""
 
-    def __init__(self, device: DescribedDevice, folder: Path, size: tuple[int, int], shown: Any) -> None:
-        """`shown` is the view of the display image, of `size`."""
+    def __init__(
+        self, device: DescribedDevice, folder: Path, size: tuple[int, int], shown: Any, in_blocks: bool = True
+    ) -> None:
+        """`shown` is the view of the display image, of `size`.
+
+        `in_blocks`: cube maps are also there as BC6H, for adapters that have it. Mixes of light cannot be written so.
+        """
+        self._in_blocks = in_blocks
         self._device, self._folder, self._size, self._shown = device, folder, size, shown
         wide, _ = whole_window(size)
         self._mirrored = int(wide[0]), int(wide[1])
@@ -168,7 +175,7 @@ class Manifest:
     def _with_standin(self, texture: Any) -> dict[str, Any]:
         """Where the content of a texture is, and what stands in for it until it has arrived, if it is large."""
         content = self._content(texture)
-        if content["packed"] < LARGE:
+        if content.get("blocks", content)["packed"] < LARGE:
             return content
         found = standin(texture.format, texture.size, texture_levels(self._device, texture))
         if found is None:
@@ -199,7 +206,10 @@ class Manifest:
             return self.chunks.add(b"".join(levels))
         if texture.format == COLOURS and (picture := _picture(texture, levels)):
             return self.chunks.add_picture(picture)
-        return self.packed_texels(texture.format, texture.size[2], levels)
+        found = self.packed_texels(texture.format, texture.size[2], levels)
+        if self._in_blocks and (blocks := blocks_of(texture.format, texture.size, levels)):
+            found["blocks"] = self.chunks.add(blocks)
+        return found
 
     def place_of(self, one: Any) -> int | None:
         """The place of an object that a frame uses; None of another."""

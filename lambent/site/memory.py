@@ -1,4 +1,7 @@
-"""Memory that a site takes in a browser, by its manifest: on the graphics adapter, and in JavaScript."""
+"""What a site takes, by its manifest: bytes to transfer, and memory of the graphics adapter and of JavaScript.
+
+For adapters with BC6H, where a site has cube maps in blocks.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from lambent.realtime.gpu.read_back import BLOCKS, texel
+from lambent.realtime.gpu.read_back import BC6H, BLOCKS, texel
 from lambent.realtime.planar.planar_view import whole_window
 from lambent.site.manifest import CANVAS, MIRROR
 
@@ -20,19 +23,30 @@ def graphics_bytes(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> int:
     return buffers + sum(map(_texture_bytes, tables["texture"]))
 
 
+def transferred(document: Mapping[str, Any]) -> int:
+    """Bytes of data until the first state is exact, without stand-ins."""
+    counts, tables = document["states"][0]["counts"], document["tables"]
+    shown = [one["data"] for kind in ("buffer", "texture") for one in tables[kind][: counts[kind]] if "data" in one]
+    pieces = [*shown, *document["clusters"].values(), *document["mirrors"]["corners"]]
+    sizes = {one["file"]: one["packed"] for one in (piece.get("blocks", piece) for piece in pieces)}
+    return sum(sizes.values())
+
+
 def script_bytes(document: Mapping[str, Any], faces: int) -> int:
     """Bytes that JavaScript keeps: corners of triangles, and contents in which states differ."""
     kept: dict[str, int] = {}
     for state in document["states"]:
         for kind, places in state["changes"].items():
             for at, piece in places.items():
-                for one in (piece, document["tables"][kind][at]["data"]):
+                for of in (piece, document["tables"][kind][at]["data"]):
+                    one = of.get("blocks", of)
                     kept[one["file"]] = one["bytes"]
     return faces * FACE_BYTES + sum(kept.values())
 
 
 def _texture_bytes(one: Mapping[str, Any]) -> int:
-    block, side = BLOCKS.get(one["format"]) or (math.prod(texel(one["format"])), 1)
+    form = BC6H if "blocks" in one.get("data", {}) else one["format"]
+    block, side = BLOCKS.get(form) or (math.prod(texel(form)), 1)
     following = {CANVAS: CANVAS_PX, MIRROR: [int(px) for px in whole_window(CANVAS_PX)[0]]}
     sides = following.get(one["size"][0]) or one["size"][:2]
     layers = one["size"][2] if len(one["size"]) > 2 else 1

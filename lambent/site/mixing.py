@@ -55,7 +55,7 @@ class Mixing:
     def bytes_of(self) -> dict[str, int]:
         """Bytes to transfer when a group's light first changes, by its name, in all states."""
         files = self._manifest.chunks.files
-        return {name: sum(files[one] for one in of) for name, of in zip(self.names, self._files, strict=True)}
+        return {name: sum(files.get(one, 0) for one in of) for name, of in zip(self.names, self._files, strict=True)}
 
     def state(self, light: LightMix) -> dict[str, Any]:
         """Of the state of the room that the manifest wrote last, which shows a mix: its textures and numbers by group.

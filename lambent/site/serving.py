@@ -14,7 +14,7 @@ from lambent.core.errors import UserError
 TYPES = {
     ".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=utf-8", ".css": "text/css; charset=utf-8",
     ".json": "application/json", ".wgsl": "text/plain; charset=utf-8", ".gz": "application/gzip", ".jpg": "image/jpeg",
-    ".webp": "image/webp",
+    ".webp": "image/webp", ".avif": "image/avif",
 }  # fmt: skip
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 FOREVER = "public, max-age=31536000, immutable"  # names of data and shaders are hashes of their content

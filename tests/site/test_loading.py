@@ -8,13 +8,14 @@ import gzip
 import numpy as np
 import pytest
 
+from lambent.baked.light_fields.blocks.bc6h import decoded
 from lambent.realtime.light.baked import read_baked
 from lambent.realtime.planar.planar_view import whole_window
 from lambent.site.memory import graphics_bytes, script_bytes
 from lambent.site.standins import COARSE_LEVEL, DROPPED_BITS, standin
 from lambent.site.vertices import UNITS, vertices_of, words_of
 from lambent.store.store import Store
-from tests.site.test_export import manifest_of, unpacked
+from tests.site.test_export import manifest_of, packed_bytes, unpacked
 
 
 def encoded(data: bytes) -> str:
@@ -88,6 +89,25 @@ def test_coarse_levels_are_enlarged(javascript, size):
     assert at == found.size
 
 
+def test_stand_ins_of_blocks_have_their_colour(javascript):
+    """As the decoder of light fields reads them: each block has the colour of the texel in its corner."""
+    levels = [np.random.default_rng(6).uniform(0, 9, (6, 32 >> k, 32 >> k, 4)).astype(np.float16) for k in range(6)]
+    finest, coarse = standin("rgba16float", (32, 32, 6), [level.tobytes() for level in levels])
+    code = """import {blocksLike} from './loading.js';
+    const bytes = new Uint8Array(Buffer.from(given.data, 'base64')).buffer;
+    say(Buffer.from(blocksLike(bytes, given.size, given.levels, given.finest)).toString('base64'));"""
+    given = {"data": encoded(b"".join(coarse)), "size": (32, 32, 6), "levels": 6, "finest": finest}
+    words, at = np.frombuffer(base64.b64decode(javascript(code, given)), np.uint32), 0
+    for k, level in enumerate(levels):
+        n = max(1, len(level[0]) // 4)
+        light = decoded(words[at : at + 24 * n * n].reshape(6, n, n, 4))[:, ::4, ::4]
+        at += 24 * n * n
+        source = levels[max(k, finest)]
+        corners = np.minimum(np.arange(n) * 4 // (1 << max(finest - k, 0)), len(source[0]) - 1)
+        np.testing.assert_allclose(light, source[:, corners][:, :, corners, :3], rtol=0.05)
+    assert at == len(words)
+
+
 def test_blocks_of_a_light_map_are_means_of_its_charts(javascript):
     """The dark beside a chart is no part of them; without a whole block at the end, the last one serves."""
     texels = np.zeros((2, 5, 7, 4), np.float16)
@@ -129,7 +149,7 @@ def test_a_site_has_stand_ins_for_what_is_large(streamed_site, blue_box):
     assert sum(files.values()) < 0.5 * sum({piece["file"]: piece["packed"] for piece in first}.values())
     for at in large:
         piece = textures[at]["data"]["standin"]
-        assert len(gzip.decompress((streamed_site / piece["file"]).read_bytes())) == piece["bytes"]
+        assert len(gzip.decompress(packed_bytes(streamed_site, piece))) == piece["bytes"]
     (piece,) = [one["data"] for one in buffers if one["usage"] & 0x20]
     words = np.frombuffer(unpacked(streamed_site, piece), np.uint32).reshape(-1, 11)
     positions = read_baked(Store.open(blue_box)).positions
@@ -176,9 +196,9 @@ def test_memory_is_that_of_the_objects(streamed_site):
         wanted += bytes_of[one["format"]] * sum(levels)
     assert graphics_bytes(tables) == wanted
     (blue,) = manifest["states"][1:]
-    changed = {piece["file"]: piece["bytes"] for places in blue["changes"].values() for piece in places.values()}
-    places = [tables[kind][int(at)]["data"] for kind, places in blue["changes"].items() for at in places]
-    changed |= {piece["file"]: piece["bytes"] for piece in places}
+    changed = [piece for places in blue["changes"].values() for piece in places.values()]
+    changed += [tables[kind][int(at)]["data"] for kind, places in blue["changes"].items() for at in places]
+    changed = {one["file"]: one["bytes"] for one in (piece.get("blocks", piece) for piece in changed)}
     by_number = {kind: {int(at): piece for at, piece in places.items()} for kind, places in blue["changes"].items()}
     document = {"tables": tables, "states": [{"changes": {}}, {"changes": by_number}]}
     assert script_bytes(document, 10) == 360 + sum(changed.values())
@@ -191,6 +211,6 @@ def _level_texels(width: int, height: int, one: dict) -> list[int]:
 def _content(site, one):
     """A texture's content, pictures as texels."""
     if not one["data"].get("picture"):
-        return unpacked(site, one["data"])
+        return unpacked(site, one["data"].get("blocks", one["data"]))
     levels = [(one["size"][0] >> k or 1) * (one["size"][1] >> k or 1) * 4 for k in range(one["mipLevelCount"])]
     return bytes(sum(levels))

@@ -6,7 +6,8 @@ import math
 import re
 from typing import Any
 
-BLOCKS = {"bc6h-rgb-ufloat": (16, 4)}  # bytes of a block, and its texels a side
+BC6H = "bc6h-rgb-ufloat"
+BLOCKS = {BC6H: (16, 4)}  # bytes of a block, and its texels a side
 WORDS = ("rgb10a2unorm", "rgb9e5ufloat", "depth32float")  # of 4 bytes a texel
 
 

@@ -1,6 +1,6 @@
 // The graphics device of a browser.
 
-import { SiteError } from "./loading.js";
+import { SiteError, takeBlocks } from "./loading.js";
 
 /** What a browser lacks, in a line; null if nothing. @param {any} manifest @param {GPUAdapter} adapter */
 function lacking(manifest, adapter) {
@@ -54,6 +54,7 @@ export async function openDevice(manifest) {
   /** @type {GPUFeatureName[]} */
   const wanted = ["texture-compression-bc", "float32-filterable"];
   const most = Math.max(...manifest.tables.buffer.map((/** @type {any} */ one) => one.size), 1 << 27);
+  if (adapter.features.has("texture-compression-bc")) takeBlocks(manifest);
   return adapter.requestDevice({
     requiredFeatures: wanted.filter((one) => adapter.features.has(one)),
     requiredLimits: {

@@ -34,8 +34,9 @@ export async function readText(file) {
 }
 
 /** @typedef {{word: 1|2|4, channels: number, runs: [number, number][]}} Packing */
-/** @typedef {{file: string, bytes: number, packed: number, sha256: string, packing?: Packing, units?: number[], picture?: boolean}} Piece */
+/** @typedef {{file: string, bytes: number, packed: number, sha256: string, packing?: Packing, units?: number[], picture?: boolean, inline?: string, blocks?: Piece, standin?: any}} Piece */
 
+export const BLOCKS = "bc6h-rgb-ufloat";
 const STEPS = 32767; // of an octahedron's square
 
 /** The data of differences: see lambent/site/chunks.py. @param {Uint8Array} bytes @param {Packing} packing @returns {ArrayBuffer} */
@@ -119,6 +120,47 @@ export function enlarged(standin, [width, height, layers = 1], levels, finest, b
   return found.buffer;
 }
 
+/** Take cube maps in blocks of BC6H, where the manifest has them. @param {any} manifest */
+export function takeBlocks({ tables, states }) {
+  /** @param {Piece} piece @returns {Piece} */
+  const taken = ({ blocks, standin, ...piece }) => ({ ...(blocks ?? piece), ...(standin ? { standin } : {}) });
+  for (const one of tables.texture) {
+    if (one.data?.blocks) one.format = BLOCKS;
+    if (one.data) one.data = taken(one.data);
+  }
+  for (const { changes } of states) {
+    for (const [at, piece] of Object.entries(changes.texture ?? {})) changes.texture[at] = taken(piece);
+  }
+}
+
+/**
+ * Levels of a texture in blocks of BC6H from its stand-in, half floats of which the first level is the `finest`: each block
+ * of the one colour that is in its corner.
+ * @param {ArrayBuffer} standin @param {number[]} size @param {number} levels @param {number} finest
+ */
+export function blocksLike(standin, [width, , layers = 1], levels, finest) {
+  const from = new Uint16Array(standin),
+    sides = Array.from({ length: Math.max(levels, finest + 1) }, (_, level) => Math.max(1, width >> level)),
+    across = sides.map((side) => Math.ceil(side / 4));
+  const found = new Uint32Array(across.slice(0, levels).reduce((sum, n) => sum + 4 * n * n * layers, 0));
+  for (let level = 0, to = 0, first = 0; level < levels; level++) {
+    const source = Math.max(level, finest),
+      [side, shift] = [sides[source], source - level];
+    for (let row = 0; row < across[level] * layers; row++) {
+      const layer = Math.floor(row / across[level]),
+        line = layer * side + Math.min((4 * (row % across[level])) >> shift, side - 1);
+      for (let x = 0; x < across[level]; x++, to += 4) {
+        const at = first + 4 * (line * side + Math.min((4 * x) >> shift, side - 1));
+        const [r, g, b] = [0, 1, 2].map((i) => Math.min(Math.max(Math.round((from[at + i] - 15) / 31), 0), 1023));
+        found[to] = 3 | (r << 5) | (g << 15) | (b << 25); // mode 11: both ends in 10 bits, all texels at the first
+        found[to + 1] = b >> 7;
+      }
+    }
+    if (level >= finest) first += 4 * side * side * layers;
+  }
+  return found.buffer;
+}
+
 /** Files whose content is needed again once it is on the GPU: what states change. @param {any} manifest @returns {Set<string>} */
 export function neededAgain({ tables, states }) {
   const files = new Set();
@@ -155,10 +197,11 @@ export class Data {
 
   /** @param {Piece} piece @returns {Promise<ArrayBuffer | ImageBitmap>} */
   async unpacked(piece) {
-    const answer = await fetched(piece.file);
     let packed;
+    if (piece.inline) packed = new Blob([Uint8Array.from(atob(piece.inline), (one) => one.charCodeAt(0))]);
+    const answer = packed ? null : await fetched(piece.file);
     try {
-      packed = await answer.blob();
+      packed ??= await /** @type {Response} */ (answer).blob();
     } catch {
       throw new FileError(`${piece.file} did not arrive whole; is the server still there?`);
     }

@@ -36,10 +36,10 @@ function entitle({ name, visit: { caption } }) {
 /** Load the room: it is shown with stand-ins for large textures first, then with all that it consists of. */
 async function open() {
   shown = undefined;
-  const manifest = await readManifest(),
-    all = packedBytes(manifest);
+  const manifest = await readManifest();
   entitle(manifest);
   const device = await openDevice(manifest),
+    all = packedBytes(manifest),
     here = visit ?? new Visit(manifest, canvas);
   const report = (/** @type {number} */ done) => {
     const of = done > all ? "" : ` of ${(all / MB).toFixed(1)}`;

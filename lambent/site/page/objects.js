@@ -1,6 +1,6 @@
 // The objects of WebGPU that a manifest describes, and their contents.
 
-import { enlarged, readText } from "./loading.js";
+import { BLOCKS, blocksLike, enlarged, readText } from "./loading.js";
 import { wholeWindow } from "./mirrors.js";
 
 /** @typedef {import("./loading.js").Data} Data */
@@ -12,7 +12,7 @@ const WORDS = ["rgb10a2unorm", "rgb9e5ufloat", "depth32float"]; // of 4 bytes a 
 
 /** Bytes of a block, and its texels a side. @param {string} format @returns {[number, number]} */
 function blockOf(format) {
-  if (format === "bc6h-rgb-ufloat") return [16, 4];
+  if (format === BLOCKS) return [16, 4];
   const parts = WORDS.includes(format) ? null : /^([rgba]+)(8|16|32)/.exec(format);
   return [parts ? (parts[1].length * Number(parts[2])) / 8 : 4, 1];
 }
@@ -124,7 +124,12 @@ export class Objects {
   begin(kind, at, content) {
     const { data, size, format, mipLevelCount = 1 } = this.manifest.tables[kind][at];
     if (!data.standin) return this.write(kind, at, content);
-    this.write(kind, at, enlarged(content, size, mipLevelCount, data.standin.finest, blockOf(format)[0]));
+    const { finest } = data.standin;
+    const isInBlocks = format === BLOCKS;
+    const whole = isInBlocks
+      ? blocksLike(content, size, mipLevelCount, finest)
+      : enlarged(content, size, mipLevelCount, finest, blockOf(format)[0]);
+    this.write(kind, at, whole);
     this.coarse.add(at);
   }
 
