@@ -25,7 +25,7 @@ from lambent.scenes import builtin, loaders
 from lambent.scenes.loaders.blender import BLEND, exported
 from lambent.scenes.loaders.contents import Contents, LoadOptions
 from lambent.scenes.loaders.meshes.flush import with_flush_raised
-from lambent.scenes.loaders.meshes.inverted import with_lamps_outwards
+from lambent.scenes.loaders.meshes.inverted import with_solids_outwards
 from lambent.scenes.loaders.meshes.repair import box_mapped, deviation_warnings, with_creases
 from lambent.scenes.loaders.scene_files import SceneFiles
 from lambent.scenes.loaders.scene_toml.document import load_toml
@@ -61,7 +61,7 @@ def load_scene(path_or_builtin: str | Path, crease_deg: float | None = None) -> 
         return replace(scene, warnings=(*lost, *scene.warnings))
     scene, text = _load(path_or_builtin, crease_deg), str(path_or_builtin)
     origin = text if text.startswith(BUILTIN_PREFIX) else os.path.abspath(text)
-    scene = with_uv(with_luminous_surfaces(with_lamps_outwards(scene)))
+    scene = with_uv(with_luminous_surfaces(with_solids_outwards(scene)))
     angle = scene.crease_deg if crease_deg is None else crease_deg
     if angle is not None:
         scene = replace(scene, objects=with_creases(scene.objects, angle), crease_deg=angle)

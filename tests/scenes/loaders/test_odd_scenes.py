@@ -1,4 +1,4 @@
-"""Lamps that look inwards are turned, rooms that shine are not; other units and impossible materials are told."""
+"""Solids that look inwards are turned, rooms are not; other units and impossible materials are told."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from lambent.core.geometry.triangles import triangle_normals
 from lambent.core.views.camera import Camera
 from lambent.scenes.geometry import box, patch, placed, transformed
-from lambent.scenes.loaders.meshes.inverted import shines_inwards, with_lamps_outwards
+from lambent.scenes.loaders.meshes.inverted import looks_inwards, with_solids_outwards
 from lambent.scenes.loaders.meshes.repair import MeshArrays, mesh_of
 from lambent.scenes.scene import Scene, SceneObject
 from lambent.scenes.validation import reflectance_warnings, size_warnings
@@ -25,19 +25,21 @@ def scene_of(*objects: SceneObject) -> Scene:
 
 
 def test_a_lamp_is_turned_outwards_and_named() -> None:
-    scene = with_lamps_outwards(scene_of(FLOOR, LAMP))
+    dark = replace(LAMP, name="shelf", mesh=placed(LAMP.mesh, (0.5, 0, 0)), emission=(0, 0, 0))
+    scene = with_solids_outwards(scene_of(FLOOR, LAMP, dark))
+    assert not looks_inwards(scene.object("shelf").mesh)
     mesh = scene.object("lamp").mesh
     away = mesh.positions - mesh.positions.mean(axis=0)
     assert ((mesh.normals * away).sum(axis=1) > 0).all()
-    assert not shines_inwards(mesh)
+    assert not looks_inwards(mesh)
     assert scene.object("floor") is FLOOR
-    assert "faces of lamp look inwards" in scene.warnings[-1]
+    assert "faces of lamp and shelf look inwards" in scene.warnings[-1]
 
 
 def test_against_the_winding_too() -> None:
     mesh = replace(LAMP.mesh, faces=np.ascontiguousarray(LAMP.mesh.faces[:, ::-1]))
-    assert shines_inwards(mesh)
-    assert not shines_inwards(replace(mesh, normals=-mesh.normals))
+    assert looks_inwards(mesh)
+    assert not looks_inwards(replace(mesh, normals=-mesh.normals))
 
 
 def test_what_shines_into_a_room_stays() -> None:
@@ -45,7 +47,7 @@ def test_what_shines_into_a_room_stays() -> None:
     thing = SceneObject("thing", box((0.1, 0.1, 0.1)), "grey")
     looked_at = replace(scene_of(room), cameras=(Camera("view", (0, 0, 0.5), (0, 0, 0)),))
     for scene in (scene_of(room, thing), looked_at, scene_of(FLOOR), scene_of(replace(LAMP, mesh=FLOOR.mesh), thing)):
-        assert with_lamps_outwards(scene) is scene
+        assert with_solids_outwards(scene) is scene
 
 
 def test_a_room_in_centimetres_is_asked_about() -> None:

@@ -1,4 +1,4 @@
-"""Lamps whose faces look inwards: closed solids that shine into themselves, so that none of their light gets out."""
+"""Closed solids whose faces look inwards: lamps shine into themselves, and all around counts as within a solid."""
 
 from __future__ import annotations
 
@@ -13,39 +13,39 @@ from lambent.scenes.mesh import Mesh, boxes_of
 from lambent.scenes.scene import DirectionalLight, Scene
 
 
-def with_lamps_outwards(scene: Scene) -> Scene:
-    """The scene with such lamps turned outwards, and a warning that names them.
+def with_solids_outwards(scene: Scene) -> Scene:
+    """The scene with such solids turned outwards, and a warning that names them.
 
-    One around another object, a light or a camera is a room that shines, and stays.
+    One around another object, a light or a camera is a room, and stays.
     """
-    shining = [i for i, o in enumerate(scene.objects) if any(o.emission) and shines_inwards(o.mesh)]
-    if not shining:
+    inwards = [i for i, o in enumerate(scene.objects) if looks_inwards(o.mesh)]
+    if not inwards:
         return scene
     boxes, within = boxes_of([o.mesh for o in scene.objects]), _places(scene)
-    turned = [
-        i for i in shining if not _around(boxes[i], np.concatenate([np.delete(boxes.mean(axis=1), i, 0), within]))
-    ]
+    middles = boxes.mean(axis=1)
+    turned = [i for i in inwards if not _around(boxes[i], np.concatenate([np.delete(middles, i, 0), within]))]
     if not turned:
         return scene
     objects = list(scene.objects)
     for i in turned:
         objects[i] = replace(objects[i], mesh=_turned(objects[i].mesh))
     names = first_of([objects[i].name for i in turned])
-    warning = f"the faces of {names} look inwards, where light would stay: turned outwards"
+    warning = f"the faces of {names} look inwards: turned outwards"
     return replace(scene, objects=tuple(objects), warnings=(*scene.warnings, warning))
 
 
-def shines_inwards(mesh: Mesh) -> bool:
+def looks_inwards(mesh: Mesh) -> bool:
     """Whether a mesh is closed, and its normals point into the volume within."""
-    _, place = np.unique(mesh.positions, axis=0, return_inverse=True)
-    corners = place.reshape(-1)[mesh.faces].astype(np.int64)
-    ends = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
-    if (np.unique(ends, axis=0, return_counts=True)[1] != 2).any():
-        return False
-    vectors = area_vectors(mesh.corners)
+    corners = mesh.corners
+    vectors = area_vectors(corners)
     vectors *= np.sign((vectors * mesh.normals[mesh.faces].sum(axis=1)).sum(axis=1))[:, None]
-    middle = mesh.corners.mean(axis=1)
-    return bool((vectors * (middle - middle.mean(axis=0))).sum() < 0)
+    middle = corners.mean(axis=1)
+    if (vectors * (middle - middle.mean(axis=0))).sum() >= 0:
+        return False
+    _, place = np.unique(mesh.positions, axis=0, return_inverse=True)
+    ends = place.reshape(-1)[mesh.faces].astype(np.int64)
+    edges = np.sort(np.concatenate([ends[:, [0, 1]], ends[:, [1, 2]], ends[:, [2, 0]]]), axis=1)
+    return bool((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
 
 
 def _places(scene: Scene) -> Floats:
