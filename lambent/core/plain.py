@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import unicodedata
 from collections import Counter
@@ -11,6 +12,8 @@ from typing import Any
 
 _UNSHOWN = ("Cc", "Cf", "Cs", "Zl", "Zp")  # categories of Unicode
 Triple = tuple[float, float, float]
+
+LONGEST, LETTERS = 200, 40  # bytes of a name that a folder has as it is; letters of others
 
 
 def plain(value: Any) -> Any:
@@ -65,6 +68,15 @@ def quad(values: Iterable[Any]) -> tuple[float, float, float, float]:
 def plain_name(name: str, otherwise: str = "material") -> str:
     """A file name made from any user-supplied name; `otherwise` if no character survives."""
     return "".join(c if c.isalnum() or c in " ._-" else "_" for c in name).strip(" .") or otherwise
+
+
+def as_folder(name: str) -> str:
+    """`name`, if folders can have it, else its first letters and a hash of all: file systems take 255 bytes a name."""
+    parts = name.split("/")
+    if name.isprintable() and all(part not in ("", ".", "..") and len(part.encode()) <= LONGEST for part in parts):
+        return name
+    letters = "".join(letter if letter.isalnum() else "_" for letter in name[:LETTERS])
+    return f"{letters}-{hashlib.sha256(name.encode('utf-8', 'surrogatepass')).hexdigest()[:16]}"
 
 
 class UniqueNames:

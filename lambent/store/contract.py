@@ -126,7 +126,7 @@ from pydantic import Field, ValidationError
 
 from lambent.core.errors import UserError, invalid
 from lambent.core.light.colour import MOST_UNIT
-from lambent.core.plain import Triple, triple
+from lambent.core.plain import Triple, as_folder, triple
 from lambent.core.strict import Strict
 from lambent.core.views.camera import Camera, CameraPath
 from lambent.materials.document import Material
@@ -308,12 +308,12 @@ def transport_lights(store: Store, camera: Camera, width: int, height: int) -> l
 
 def probe_name(object_name: str, part: str) -> str:
     """Name of a probe's array; `part` is radiance, groups, distance or planes."""
-    return f"probe/{object_name}/{part}"
+    return f"probe/{as_folder(object_name)}/{part}"
 
 
 def light_field_name(object_name: str, part: str) -> str:
     """Name of an array of an object's light field; see above for `part`."""
-    return f"light_field/{object_name}/{part}"
+    return f"light_field/{as_folder(object_name)}/{part}"
 
 
 def probe_irradiance(store: Store, object_name: str) -> tuple[float, ...]:
@@ -362,7 +362,7 @@ def noise_name(side: str) -> str:
 
 def texture_name(material_name: str, part: str) -> str:
     """Name of a texture's array; `part` is a field of scenes.scene.MaterialTextures."""
-    return f"texture/{material_name}/{part}"
+    return f"texture/{as_folder(material_name)}/{part}"
 
 
 def needs_probe(material: Material) -> bool:

@@ -44,6 +44,7 @@ from lambent.baked.answering.rays import Rays, last_points
 from lambent.baked.answering.smoothing import alike
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
+from lambent.core.plain import as_folder
 from lambent.scenes.light_groups import SUN
 from lambent.store.contract import SIDES, SceneRecord, scene_record, sun_left_out
 from lambent.store.light_groups import group_name, light_groups
@@ -63,7 +64,7 @@ def answer_name(part: str) -> str:
 
 def probe_spots_name(object_name: str, part: str) -> str:
     """Name of an array of a probe's visible texels."""
-    return f"answer/probe/{object_name}/{part}"
+    return f"answer/probe/{as_folder(object_name)}/{part}"
 
 
 def has_answer(store: Store) -> bool:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from lambent.core.geometry.triangles import triangle_normals
+from lambent.core.plain import as_folder
 from lambent.core.views.camera import Camera
 from lambent.scenes.geometry import box, patch, placed, transformed
 from lambent.scenes.loaders.meshes.inverted import looks_inwards, with_solids_outwards
@@ -74,6 +75,18 @@ def test_doubled_faces_are_dropped_and_normals_do_not_cancel() -> None:
     both = MeshArrays(np.tile(solid.positions, (2, 1)), apart, np.concatenate([solid.normals, -solid.normals]))
     kept, _ = mesh_of(both, name="sign", file=Path("sign.glb"))
     assert kept is not None and len(kept.faces) == 24, "copies with normals of their own may shine on both sides"
+
+
+def test_every_name_has_a_folder_of_its_own(tmp_path: Path) -> None:
+    odd = ["..", ".", "", "a/../b", "long " * 60, "long " * 61, "\N{CHAIR}" * 80, "a\nb", "/", "a\x00b"]
+    folders = [as_folder(name) for name in odd]
+    assert len({*folders}) == len(odd)
+    for name in folders:
+        (tmp_path / name).mkdir()
+    assert len(list(tmp_path.iterdir())) == len(odd)
+    assert [as_folder(name) for name in ("wall_1", "Küche", "a/b", "glass: clear")] == [
+        "wall_1", "Küche", "a/b", "glass: clear"
+    ]  # fmt: skip
 
 
 def test_a_material_that_makes_light_is_named() -> None:
