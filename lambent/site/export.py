@@ -30,7 +30,7 @@ from lambent.render.output import ignore
 from lambent.scenes.scene import Variant
 from lambent.site.cameras import cameras_of, frames_of, widest
 from lambent.site.manifest import Manifest, camel
-from lambent.site.memory import graphics_bytes, script_bytes, transferred
+from lambent.site.memory import graphics_bytes, needs_of, script_bytes, transferred
 from lambent.site.mixing import mixing_of
 from lambent.site.things import things
 from lambent.store.kept.states import lamps_of, variants_of
@@ -92,7 +92,7 @@ def export(store: Store, folder: Path, progress: Progress = silent, note: Note =
         "viewTransform": VIEW_TRANSFORMS[state.view_transform],
         **of_cameras,
         "visit": things(store.folder, baked.record, renderer.resources, manifest, [room for room, _ in rooms]),
-        "tables": manifest.tables, "passes": manifest.passes, "states": states,
+        "needs": needs_of(manifest.tables), "tables": manifest.tables, "passes": manifest.passes, "states": states,
         **({} if mixing is None else mixing.said),
     }  # fmt: skip
     write_text(folder / "manifest.json", json.dumps(document, separators=(",", ":"), allow_nan=False))

@@ -32,6 +32,16 @@ def transferred(document: Mapping[str, Any]) -> int:
     return sum(sizes.values())
 
 
+def needs_of(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> dict[str, int]:
+    """What buffers and textures need, by WebGPU's names of limits; without textures that follow the window."""
+    sizes = [one["size"] for one in tables["texture"] if one["size"][0] not in (CANVAS, MIRROR)]
+    return {
+        "maxTextureDimension2D": max((int(side) for size in sizes for side in size[:2]), default=1),
+        "maxTextureArrayLayers": max((int(layers) for size in sizes for layers in size[2:]), default=1),
+        "maxBufferSize": max((int(one["size"]) for one in tables["buffer"]), default=0),
+    }
+
+
 def script_bytes(document: Mapping[str, Any], faces: int) -> int:
     """Bytes that JavaScript keeps: corners of triangles, and contents in which states differ."""
     kept: dict[str, int] = {}

@@ -11,7 +11,7 @@ import pytest
 from lambent.baked.light_fields.blocks.bc6h import decoded
 from lambent.realtime.light.baked import read_baked
 from lambent.realtime.planar.planar_view import whole_window
-from lambent.site.memory import graphics_bytes, script_bytes
+from lambent.site.memory import graphics_bytes, needs_of, script_bytes
 from lambent.site.standins import COARSE_LEVEL, DROPPED_BITS, standin
 from lambent.site.vertices import UNITS, vertices_of, words_of
 from lambent.store.store import Store
@@ -161,7 +161,7 @@ def test_a_site_has_stand_ins_for_what_is_large(streamed_site, blue_box):
     [
         ("texture", {"size": [300, 9000, 1]}, "allows 8192 texels a side of a texture, the room has 9000: bake it at"),
         ("texture", {"size": [8, 8, 300]}, "allows 256 layers of a texture, the room has 300"),
-        ("buffer", {"size": 3e8}, "allows 250000000 bytes of a buffer, the room has 300000000"),
+        ("buffer", {"size": 300_000_000}, "allows 250000000 bytes of a buffer, the room has 300000000"),
         ("texture", {"size": ["canvas", "canvas", 1]}, None),
     ],
 )
@@ -169,7 +169,7 @@ def test_what_an_adapter_does_not_allow_is_said(javascript, table, one, words):
     tables = {"texture": [{"size": [64, 64]}], "buffer": [{"size": 80}]}
     tables[table].append(one)
     limits = {"maxTextureDimension2D": 8192, "maxTextureArrayLayers": 256, "maxBufferSize": 250_000_000}
-    found = javascript("import {beyond} from './device.js'; say(beyond(...given));", [tables, limits])
+    found = javascript("import {beyond} from './device.js'; say(beyond(...given));", [needs_of(tables), limits])
     assert found is None if words is None else words in found
 
 

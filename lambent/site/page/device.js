@@ -8,32 +8,19 @@ function lacking(manifest, adapter) {
   return blocks && !adapter.features.has("texture-compression-bc") ? "compressed textures (BC)" : null;
 }
 
-/** What of a room an adapter does not allow, and what helps, in a line; null if nothing. @param {any} tables @param {GPUSupportedLimits} limits */
-export function beyond({ texture, buffer }, limits) {
-  /** @type {number[][]} */
-  const sizes = texture.map((/** @type {any} */ { size }) => size.map((/** @type {any} */ n) => Number(n) || 1)); // or the canvas
-  const wants = [
-    {
-      largest: Math.max(...sizes.flatMap(([w, h]) => [w, h])),
-      most: limits.maxTextureDimension2D,
-      what: "texels a side of a texture",
-    },
-    {
-      largest: Math.max(...sizes.map(([, , layers = 1]) => layers)),
-      most: limits.maxTextureArrayLayers,
-      what: "layers of a texture",
-    },
-    {
-      largest: Math.max(...buffer.map((/** @type {any} */ one) => one.size)),
-      most: limits.maxBufferSize,
-      what: "bytes of a buffer",
-    },
-  ];
-  const found = wants.find(({ largest, most }) => largest > most);
+/** @type {Record<string, string>} what of a room a limit of an adapter is for */
+const LIMITS = {
+  maxTextureDimension2D: "texels a side of a texture",
+  maxTextureArrayLayers: "layers of a texture",
+  maxBufferSize: "bytes of a buffer",
+};
+
+/** What of a room an adapter does not allow, and what helps, in a line; null if nothing. @param {Record<string, number>} needs by limit @param {any} limits */
+export function beyond(needs, limits) {
+  const name = Object.keys(LIMITS).find((one) => needs[one] > limits[one]);
+  if (!name) return null;
   const help = "bake it at a lower --quality, with smaller pictures or fewer triangles, and export it again";
-  return found
-    ? `This graphics adapter allows ${found.most} ${found.what}, the room has ${found.largest}: ${help}.`
-    : null;
+  return `This graphics adapter allows ${limits[name]} ${LIMITS[name]}, the room has ${needs[name]}: ${help}.`;
 }
 
 /** Why there is no adapter, and what helps. */
@@ -49,11 +36,11 @@ export async function openDevice(manifest) {
   if (!adapter) throw new SiteError(missing());
   const lack = lacking(manifest, adapter);
   if (lack) throw new SiteError(`This graphics adapter has no ${lack}.`);
-  const excess = beyond(manifest.tables, adapter.limits);
+  const excess = beyond(manifest.needs, adapter.limits);
   if (excess) throw new SiteError(excess);
   /** @type {GPUFeatureName[]} */
   const wanted = ["texture-compression-bc", "float32-filterable"];
-  const most = Math.max(...manifest.tables.buffer.map((/** @type {any} */ one) => one.size), 1 << 27);
+  const most = Math.max(manifest.needs.maxBufferSize, 1 << 27);
   if (adapter.features.has("texture-compression-bc")) takeBlocks(manifest);
   return adapter.requestDevice({
     requiredFeatures: wanted.filter((one) => adapter.features.has(one)),

@@ -4,10 +4,14 @@
 export const found = (id) => document.getElementById(id);
 
 /**
- * A new element. @template {keyof HTMLElementTagNameMap} K
- * @param {K} tag @param {Partial<HTMLElementTagNameMap[K]>} properties @returns {HTMLElementTagNameMap[K]}
+ * A new element. @template {keyof HTMLElementTagNameMap} K @param {K} tag
+ * @param {Partial<HTMLElementTagNameMap[K]>} properties @param {HTMLElement[]} children @returns {HTMLElementTagNameMap[K]}
  */
-export const element = (tag, properties = {}) => Object.assign(document.createElement(tag), properties);
+export function element(tag, properties = {}, ...children) {
+  const made = Object.assign(document.createElement(tag), properties);
+  made.append(...children);
+  return made;
+}
 
 /** Fill a list with a button for each name; what is returned marks one as pressed. @param {string} id @param {string[]} names @param {(number: number) => void} act */
 export function offer(id, names, act) {

@@ -6,15 +6,19 @@ import { SiteError } from "./loading.js";
 import { mirroredViews } from "./mirrors.js";
 import { CANVAS, Objects } from "./objects.js";
 
-/** @typedef {import("./camera.js").Camera} Camera */
-/** @typedef {import("./loading.js").Data} Data */
-/** @typedef {import("./culling.js").Runs} Runs */
+/** @import { Camera } from "./camera.js" */
+/** @import { Runs } from "./culling.js" */
+/** @import { Data } from "./loading.js" */
+/** @import { View } from "./mirrors.js" */
+/** @import { Vector } from "./vectors.js" */
 /** @typedef {"moving" | "plain" | number} Kind with or without averaged edges, or the number of a frame at rest */
 
 const TURNS = 64, // of interleaved samples
   REST = 64, // frames, after which a picture at rest is done: as many turns have interleaved samples
   SMOOTH_MS = 50, // a frame that takes longer has no averaged edges
   REFINED_MS = 250; // and one that takes longer is not refined at rest
+
+const DRAWN = 0x11; // GPUTextureUsage.RENDER_ATTACHMENT | COPY_SRC, not there without WebGPU
 
 /** The inverse of a number's digits. @param {number} n @param {number} base */
 function radicalInverse(n, base) {
@@ -27,12 +31,10 @@ function radicalInverse(n, base) {
 function sorted(commands, eye) {
   const first = commands.findIndex(([name]) => name === "pane");
   if (first < 0) return commands;
-  /** @type {{awayM: number, commands: any[]}[]} */
-  const panes = [];
+  const panes = /** @type {{awayM: number, commands: any[]}[]} */ ([]);
   for (const one of commands.slice(first)) {
     if (one[0] === "pane") {
-      const awayM = Math.hypot(...one.slice(1).map((/** @type {number} */ x, /** @type {number} */ i) => x - eye[i]));
-      panes.push({ awayM, commands: [] });
+      panes.push({ awayM: Math.hypot(one[1] - eye[0], one[2] - eye[1], one[3] - eye[2]), commands: [] });
     } else panes[panes.length - 1].commands.push(one);
   }
   panes.sort((a, b) => b.awayM - a.awayM);
@@ -41,6 +43,18 @@ function sorted(commands, eye) {
 
 /** The frame of a manifest. `open` makes one. */
 export class Frame {
+  width = 0;
+  height = 0;
+  asked = 0;
+  state = 0;
+  clusters = new Clusters(new Uint32Array(0), new Float32Array(0));
+  /** @type {Float32Array[]} of reflectors' triangles */ corners = [];
+  fastestMs = Infinity;
+  rest = 0; // frames that the picture at rest is the mean of
+  shown = ""; // what it shows
+  /** @type {(state: number) => void} called when another state is shown */ entered = () => {};
+  finer = () => {}; // called when a state can be drawn, and when finer content has arrived
+
   /** @param {any} manifest @param {GPUDevice} device @param {HTMLCanvasElement} canvas */
   constructor(manifest, device, canvas) {
     this.manifest = manifest;
@@ -49,22 +63,10 @@ export class Frame {
     const context = canvas.getContext("webgpu");
     if (!context) throw new SiteError("This browser shows no WebGPU in a page.");
     this.context = context;
-    const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC;
-    context.configure({ device, format: "rgba8unorm", alphaMode: "opaque", usage });
+    context.configure({ device, format: "rgba8unorm", alphaMode: "opaque", usage: DRAWN });
     this.objects = new Objects(manifest, device);
-    this.width = this.height = this.asked = 0;
     this.exposureEv = manifest.exposureEv;
     this.viewTransform = manifest.viewTransform;
-    this.state = 0;
-    this.clusters = new Clusters(new Uint32Array(0), new Float32Array(0));
-    /** @type {Float32Array[]} of reflectors' triangles */
-    this.corners = [];
-    this.fastestMs = Infinity;
-    this.rest = 0; // frames that the picture at rest is the mean of
-    this.shown = ""; // what it shows
-    /** @type {(state: number) => void} called when another state is shown */
-    this.entered = () => {};
-    this.finer = () => {}; // called when a state can be drawn, and when finer content has arrived
   }
 
   /** @param {any} manifest @param {GPUDevice} device @param {HTMLCanvasElement} canvas @param {Data} data @param {number} number of the state @param {(frame: Frame) => void} finer */
@@ -125,20 +127,17 @@ export class Frame {
       views = this.views(camera, kind),
       encoder = device.createCommandEncoder(),
       canvas = target.createView();
-    /** @type {any[]} */
-    const passes = manifest.states[this.state].frames[typeof kind === "string" ? kind : kind % 2 ? "odd" : "even"].map(
-      (/** @type {number} */ at) => manifest.passes[at],
-    );
-    const encoded = new Set();
+    const frame = manifest.states[this.state].frames[typeof kind === "string" ? kind : kind % 2 ? "odd" : "even"],
+      passes = frame.map((/** @type {number} */ at) => manifest.passes[at]);
+    let mirrors = true; // in the place of their first pass, all passes of the first mirrored view, of the second...
     for (const one of passes) {
       if (one.view === undefined) this.encode(encoder, one, canvas, views);
-      else if (!encoded.size) {
-        // passes of mirrored views, one view after the other
+      else if (mirrors) {
+        mirrors = false;
         for (const view of views.mirrored) {
           for (const each of passes) if (each.view === view.number) this.encode(encoder, each, canvas, views, view);
         }
       }
-      if (one.view !== undefined) encoded.add(one.view);
     }
     device.queue.submit([encoder.finish()]);
   }
@@ -156,26 +155,23 @@ export class Frame {
       jitter = index < 0 ? [0, 0] : [turn - 0.5, radicalInverse(index + 1, 3) - 0.5];
     const main = frameOf(camera, width, height, nearM, jitter);
     const base = new Uint8Array(bytes);
-    const shown = { exposure: [2 ** this.exposureEv * manifest.unit] };
-    const fields = { ...main, eye: [...main.eye, Math.floor(turn * TURNS) % TURNS], ...shown };
-    new DataView(base.buffer).setUint32(offsets.view_transform, this.viewTransform, true);
-    this.record(buffer, base, offsets, fields);
+    const eye = [...main.eye, Math.floor(turn * TURNS) % TURNS],
+      exposure = [2 ** this.exposureEv * manifest.unit];
+    new Uint32Array(base.buffer)[offsets.view_transform / 4] = this.viewTransform;
+    this.record(buffer, base, offsets, { ...main, eye, exposure });
     if (index >= 0)
       this.device.queue.writeBuffer(this.objects.made.buffer[weight], 0, new Float32Array([1 / (index + 1)]));
-    /** @type {Map<number, {clip: number[][], eye: import("./vectors.js").Vector, visible: Uint8Array, seen: Runs, thin: Runs | null}>} */
+    /** @type {Map<number, {clip: number[][], eye: Vector, visible: Uint8Array, seen: Runs, thin: Runs | null}>} */
     const seen = new Map();
-    /** @param {number} at @param {number[][]} clip @param {import("./vectors.js").Vector} eye */
-    const look = (at, clip, eye) => {
+    const look = (/** @type {number} */ at, /** @type {number[][]} */ clip, /** @type {Vector} */ eye) => {
       const visible = this.clusters.visible(clip);
       seen.set(at, { clip, eye, visible, seen: this.clusters.runs(visible), thin: null });
     };
     look(buffer, main.rows, main.eye);
-    if (kind === "moving") {
-      for (const place of places) {
-        const { rows, clip_from_world, forward } = frameOf(camera, width, height, nearM, place.jitter);
-        this.record(place.buffer, base, offsets, { clip_from_world, forward });
-        look(place.buffer, rows, main.eye);
-      }
+    for (const place of kind === "moving" ? places : []) {
+      const { rows, clip_from_world, forward } = frameOf(camera, width, height, nearM, place.jitter);
+      this.record(place.buffer, base, offsets, { clip_from_world, forward });
+      look(place.buffer, rows, main.eye);
     }
     const { m } = manifest.states[this.state];
     const mirrored = mirroredViews(mirrors.reflectors, this.corners, m, main, [width, height], mirrors.most);
@@ -191,27 +187,20 @@ export class Frame {
 
   /** Write a record: floats by the names of its fields. @param {number} at @param {Uint8Array<ArrayBuffer>} bytes as before, kept @param {Record<string, number>} offsets @param {Record<string, any>} fields */
   record(at, bytes, offsets, fields) {
-    const record = new DataView(bytes.buffer);
-    for (const [name, values] of Object.entries(fields)) {
-      if (name === "rows") continue;
-      values.forEach((/** @type {number} */ value, /** @type {number} */ i) =>
-        record.setFloat32(offsets[name] + 4 * i, value, true),
-      );
-    }
+    const record = new Float32Array(bytes.buffer);
+    for (const [name, values] of Object.entries(fields)) if (name in offsets) record.set(values, offsets[name] / 4);
     this.device.queue.writeBuffer(this.objects.made.buffer[at], 0, bytes);
   }
 
-  /** @param {GPUCommandEncoder} encoder @param {any} one pass @param {GPUTextureView} canvas @param {ReturnType<Frame["views"]>} views @param {import("./mirrors.js").View} [view] */
+  /** @param {GPUCommandEncoder} encoder @param {any} one pass @param {GPUTextureView} canvas @param {ReturnType<Frame["views"]>} views @param {View} [view] */
   encode(encoder, one, canvas, views, view) {
     const { made } = this.objects,
       depth = one.depthStencilAttachment,
       camera = views.seen.get(one.camera);
+    const attached = (/** @type {any} */ a) => ({ ...a, view: a.view === CANVAS ? canvas : made.view[a.view] });
     const pass = encoder.beginRenderPass({
-      colorAttachments: one.colorAttachments.map((/** @type {any} */ a) => ({
-        ...a,
-        view: a.view === CANVAS ? canvas : made.view[a.view],
-      })),
-      ...(depth ? { depthStencilAttachment: { ...depth, view: made.view[depth.view] } } : {}),
+      colorAttachments: one.colorAttachments.map(attached),
+      ...(depth ? { depthStencilAttachment: attached(depth) } : {}),
     });
     if (view && one.camera === this.manifest.mirrors.buffers[view.number].frame) {
       pass.setScissorRect(view.rectangle[0], view.rectangle[1], view.rectangle[2], view.rectangle[3]);
@@ -232,13 +221,11 @@ export class Frame {
       else if (name === "onlyUpright") {
         if (!view?.upright) break;
       } else if (camera) {
-        if (name === "drawThin") {
+        if (name === "drawThin")
           camera.thin ??= this.clusters.runs(this.clusters.thin(camera.clip, this.height, camera.visible));
-        }
         const runs = name === "drawThin" ? /** @type {Runs} */ (camera.thin) : camera.seen;
-        for (const [face, count] of within(runs, third / 3, first / 3)) {
+        for (const [face, count] of within(runs, third / 3, first / 3))
           draw(() => pass.drawIndexed(3 * count, 1, 3 * face));
-        }
       }
     }
     pass.end();
@@ -248,12 +235,9 @@ export class Frame {
   async pixels(camera, ...kinds) {
     const { device, width, height } = this,
       row = Math.ceil((4 * width) / 256) * 256;
-    const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.COPY_SRC;
-    const target = device.createTexture({ size: [width, height], format: "rgba8unorm", usage });
-    const buffer = device.createBuffer({
-      size: row * height,
-      usage: GPUBufferUsage.COPY_DST | GPUBufferUsage.MAP_READ,
-    });
+    const target = device.createTexture({ size: [width, height], format: "rgba8unorm", usage: DRAWN });
+    const readable = GPUBufferUsage.COPY_DST | GPUBufferUsage.MAP_READ,
+      buffer = device.createBuffer({ size: row * height, usage: readable });
     if (!kinds.length) kinds = this.fastestMs < REFINED_MS ? [...Array(REST).keys()] : ["plain"];
     for (const kind of kinds) this.draw(camera, target, kind);
     this.shown = ""; // means are of this picture now

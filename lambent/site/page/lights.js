@@ -1,52 +1,37 @@
 // Sliders of the room's light groups: brightness and colour temperature, as in the window's Light panel.
 
+import { element, found } from "./elements.js";
 import { failed, tellRest } from "./messages.js";
 import { factorOf, Mixing } from "./mixing.js";
 
-/** @typedef {import("./visit.js").Visit} Visit @typedef {import("./mixing.js").Mix} Mix */
-/** @typedef {import("./address.js").Light} Light by group: intensity, or intensity and K */
+/** @import { Light } from "./address.js" */
+/** @import { BlackBodies, Mix } from "./mixing.js" */
+/** @import { Visit } from "./visit.js" */
 
 const MOST_PERCENT = 200, // of the sliders
   MOST_INTENSITY = 1000, // as of Python
   USUAL_K = 6500,
   RATIO_K = 1.01; // of a step of a slider
 
-/**
- * An element of the page. @template {keyof HTMLElementTagNameMap} K
- * @param {K} tag @param {Record<string, string>} properties @returns {HTMLElementTagNameMap[K]}
- */
-function element(tag, properties) {
-  const made = document.createElement(tag);
-  Object.assign(made, properties);
-  return made;
-}
+/** Steps of a slider from one temperature to another. @param {number} fromK @param {number} toK */
+const stepsK = (fromK, toK) => Math.log(toK / fromK) / Math.log(RATIO_K);
 
 /** The sliders of one group. */
 class Row {
+  percent = element("output");
+  kelvin = element("output");
+
   /** @param {string} name @param {[number, number]} rangeK @param {(change: Partial<Mix> | null, rests: boolean) => void} changed null: reset */
-  constructor(name, rangeK, changed) {
-    const steps = rangeK.map((kelvin) => Math.round(Math.log(kelvin / rangeK[0]) / Math.log(RATIO_K)));
-    this.lowK = rangeK[0];
-    this.bright = element("input", { type: "range", max: String(MOST_PERCENT), ariaLabel: `${name}: brightness` });
-    this.percent = element("output", {});
-    this.tints = element("input", { type: "checkbox", ariaLabel: `${name}: colour temperature`, title: "K" });
-    this.warm = element("input", { type: "range", max: String(steps[1]), ariaLabel: `${name}: colour temperature` });
-    this.kelvin = element("output", {});
-    this.element = element("fieldset", {});
-    this.element.append(
-      element("legend", { textContent: name }),
-      ...[this.bright, this.percent, this.tints, this.warm, this.kelvin],
-    );
-    const brightness = () => ({ intensity: Number(this.bright.value) / 100 });
-    const temperature = () => ({
-      kelvin: this.tints.checked ? rangeK[0] * RATIO_K ** Number(this.warm.value) : null,
-    });
-    this.bright.oninput = () => changed(brightness(), false);
-    this.bright.onchange = () => changed(brightness(), true);
-    this.warm.oninput = () => changed(temperature(), false);
-    this.warm.onchange = () => changed(temperature(), true);
+  constructor(name, [lowK, highK], changed) {
+    const ariaLabel = `${name}: colour temperature`;
+    this.lowK = lowK;
+    this.bright = slider(MOST_PERCENT, `${name}: brightness`, (value) => ({ intensity: value / 100 }), changed);
+    const most = Math.round(stepsK(lowK, highK));
+    this.warm = slider(most, ariaLabel, (value) => ({ kelvin: lowK * RATIO_K ** value }), changed);
+    this.tints = element("input", { type: "checkbox", ariaLabel, title: "K" });
     this.tints.onchange = () => changed({ kelvin: this.tints.checked ? USUAL_K : null }, true);
-    this.bright.ondblclick = this.warm.ondblclick = () => changed(null, true);
+    const legend = element("legend", { textContent: name });
+    this.element = element("fieldset", {}, legend, this.bright, this.percent, this.tints, this.warm, this.kelvin);
   }
 
   /** @param {Mix} mix */
@@ -57,24 +42,31 @@ class Row {
     this.percent.textContent = this.bright.ariaValueText = `${percent} %`;
     this.tints.checked = kelvin !== null;
     this.warm.disabled = kelvin === null;
-    this.warm.value = String(Math.log((kelvin ?? USUAL_K) / this.lowK) / Math.log(RATIO_K));
+    this.warm.value = String(stepsK(this.lowK, kelvin ?? USUAL_K));
     this.kelvin.textContent = this.warm.ariaValueText = kelvin === null ? "" : `${Math.round(kelvin)} K`;
   }
 }
 
+/** A slider that says what it changes as it moves, and once it rests; a double click resets. @param {number} most @param {string} ariaLabel @param {(value: number) => Partial<Mix>} mixOf @param {ConstructorParameters<typeof Row>[2]} changed */
+function slider(most, ariaLabel, mixOf, changed) {
+  const made = element("input", { type: "range", max: String(most), ariaLabel });
+  made.oninput = () => changed(mixOf(Number(made.value)), false);
+  made.onchange = () => changed(mixOf(Number(made.value)), true);
+  made.ondblclick = () => changed(null, true);
+  return made;
+}
+
 /** The light of a visit: its sliders, and the mix that its frame shows. */
 export class Lights {
+  /** @type {Mix[]} by group: the state's own */ own = [];
+  /** @type {Mix[]} what is wanted */ mixes = [];
+  asked = 0;
+
   /** @param {Visit} visit */
   constructor(visit) {
-    const { lightGroups, blackBodies } = visit.manifest;
     this.visit = visit;
-    /** @type {string[]} */
-    this.names = lightGroups;
-    /** @type {import("./mixing.js").BlackBodies} */
-    this.bodies = blackBodies;
-    this.asked = 0;
-    /** @type {Mix[]} by group: the state's own, and what is wanted */
-    this.own = this.mixes = [];
+    this.names = /** @type {string[]} */ (visit.manifest.lightGroups);
+    this.bodies = /** @type {BlackBodies} */ (visit.manifest.blackBodies);
     this.rows = this.names.map(
       (name, i) =>
         new Row(name, this.bodies.sliderK, (change, rests) => {
@@ -82,12 +74,10 @@ export class Lights {
           this.change(rests);
         }),
     );
-    const reset = element("button", { textContent: "Reset light" });
-    reset.onclick = () => this.restore({});
+    const reset = element("button", { textContent: "Reset light", onclick: () => this.restore({}) });
     visit.addEventListener("light", () => this.restore(visit.light));
-    const panel = /** @type {HTMLElement} */ (document.getElementById("light"));
-    panel.append(...this.rows.map((row) => row.element), reset);
-    panel.hidden = false;
+    found("light").append(...this.rows.map((row) => row.element), reset);
+    found("light").hidden = false;
   }
 
   /** Light the visit's frame, which is new, as `visit.light` says. */
@@ -139,7 +129,6 @@ export class Lights {
     this.show();
     const changed = this.names.flatMap((name, i) => (Object.hasOwn(visit.light, name) ? [i] : []));
     await mixing?.load(changed);
-    await mixing?.objects.refined; // what a mix adds to is exact
     tellRest("");
     if (wanted !== this.asked) return; // a later one shows more
     mixing?.mix(this.factors, rests);
@@ -150,11 +139,11 @@ export class Lights {
   /** The sliders, and `visit.light`. */
   show() {
     this.mixes.forEach((mix, i) => this.rows[i].show(mix));
-    const changed = this.mixes.map(({ intensity, kelvin }, i) => {
+    const changed = this.mixes.flatMap(({ intensity, kelvin }, i) => {
       const isOwn = intensity === this.own[i].intensity && kelvin === this.own[i].kelvin;
       return isOwn ? [] : [[this.names[i], kelvin === null ? intensity : [intensity, Math.round(kelvin)]]];
     });
-    this.visit.light = Object.fromEntries(changed.flat());
+    this.visit.light = Object.fromEntries(changed);
   }
 }
 

@@ -27,27 +27,18 @@ export function wholeWindow(size) {
   return { wide, offset: wide.map((length, i) => Math.floor((length - size[i]) / 2)) };
 }
 
-/** The part of a polygon in a frame, (x, y, w). @param {ArrayLike<number>} points three a corner @param {number} first @param {number} count @param {number[][]} clip */
-function onScreen(points, first, count, clip) {
-  /** @type {number[][]} */
-  let polygon = [];
-  for (let i = first; i < first + count; i++) {
-    const p = [points[3 * i], points[3 * i + 1], points[3 * i + 2]];
-    polygon.push([0, 1, 3].map((row) => dot(clip[row], p) + clip[row][3]));
-  }
+/** The part of a polygon in a frame. @param {number[][]} polygon (x, y, w) */
+function onScreen(polygon) {
   for (const side of [0, 1, 2, 3, 4]) {
     const heights = polygon.map((corner) => withinSides(corner)[side]);
     if (heights.every((height) => height > 0)) continue;
-    const kept = [];
-    for (let i = 0; i < polygon.length; i++) {
-      const j = (i + 1) % polygon.length;
-      if (heights[i] > 0) kept.push(polygon[i]);
-      if (heights[i] > 0 !== heights[j] > 0) {
-        const s = heights[i] / (heights[i] - heights[j]);
-        kept.push(polygon[i].map((value, k) => value + s * (polygon[j][k] - value)));
-      }
-    }
-    polygon = kept;
+    polygon = polygon.flatMap((corner, i) => {
+      const j = (i + 1) % polygon.length,
+        s = heights[i] / (heights[i] - heights[j]),
+        kept = heights[i] > 0 ? [corner] : [];
+      if (heights[i] > 0 === heights[j] > 0) return kept;
+      return [...kept, corner.map((value, k) => value + s * (polygon[j][k] - value))];
+    });
     if (polygon.length < 3) return [];
   }
   return polygon.map(([x, y, w]) => [x / w, y / w]);
@@ -65,7 +56,7 @@ function area(polygon) {
 
 /** Share of a frame that a reflector's triangles cover. @param {Float32Array} corners @param {number[][]} clip */
 export function shareOf(corners, clip) {
-  const places = [0, 1, 3].map((row) => {
+  const [x, y, w] = [0, 1, 3].map((row) => {
     const [a, b, c, d] = clip[row],
       found = new Float64Array(corners.length / 3);
     for (let i = 0, k = 0; k < found.length; k++, i += 3) {
@@ -73,7 +64,6 @@ export function shareOf(corners, clip) {
     }
     return found;
   });
-  const [x, y, w] = places;
   let sum = 0;
   for (let i = 0; i < w.length; i += 3) {
     let out = 15; // sides that all corners are beyond, and whether a corner is beyond any
@@ -85,11 +75,9 @@ export function shareOf(corners, clip) {
       isCut ||= beyond > 0 || w[k] <= LEAST_W;
     }
     if (out) continue;
-    if (isCut) sum += area(onScreen(corners, i, 3, clip));
-    else {
-      const [[ax, ay], [bx, by], [cx, cy]] = [i, i + 1, i + 2].map((k) => [x[k] / w[k], y[k] / w[k]]);
-      sum += Math.abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay)) / 8;
-    }
+    const triangle = [i, i + 1, i + 2];
+    if (isCut) sum += area(onScreen(triangle.map((k) => [x[k], y[k], w[k]])));
+    else sum += area(triangle.map((k) => [x[k] / w[k], y[k] / w[k]]));
   }
   return sum;
 }
@@ -188,7 +176,7 @@ function planOf(plan, plane, eye) {
 function rectangleOf(one, m, frame, size) {
   const { wide, offset } = wholeWindow(size),
     reach = Math.max(MARGIN_PX, Math.floor((m * size[1]) / Math.hypot(...frame.up)));
-  const shown = onScreen(one.outline.flat(), 0, one.outline.length, frame.rows);
+  const shown = onScreen(one.outline.map((p) => [0, 1, 3].map((row) => dot(frame.rows[row], p) + frame.rows[row][3])));
   const places = shown.map(([x, y]) => [((x + 1) / 2) * size[0] + offset[0], ((1 - y) / 2) * size[1] + offset[1]]);
   if (!places.length) return [0, 0, ...wide];
   const [[x, right], [y, below]] = [0, 1].map((i) => {

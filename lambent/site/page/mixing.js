@@ -1,21 +1,23 @@
 // Mixes the light groups of a room. Light adds up: what a mix changes are sums of each group's part times its factor.
 
-/** @typedef {import("./loading.js").Data} Data @typedef {import("./loading.js").Piece} Piece */
+import { levelsOf, writeLevels } from "./objects.js";
+import { clamp } from "./vectors.js";
+
+/** @import { Data, Piece } from "./loading.js" */
+/** @import { Objects } from "./objects.js" */
 /** @typedef {[number, number, number]} Factor by channel */
 /** @typedef {{intensity: number, kelvin: number | null, colour: Factor}} Mix of a group: `GroupMix` of Python */
 /** @typedef {{rangeK: [number, number], sliderK: [number, number], colours: Factor[]}} BlackBodies in equal ratios */
-/** @typedef {{at: number, size: number[], levels: number, pieces: (Piece | null)[], parts: GPUTexture[], own: GPUTexture | null, last: string}} Target */
+/** @typedef {{at: number, described: GPUTextureDescriptor, pieces: (Piece | null)[], parts: GPUTexture[], own: GPUTexture | null, last: string}} Target */
 
-const TEXEL = 8, // bytes
-  SIDE = 8, // of a workgroup
-  LARGEST = 65504; // half float
-
-const LUMINANCE = [0.2126, 0.7152, 0.0722];
+const SIDE = 8, // of a workgroup
+  LARGEST = 65504, // half float
+  LUMINANCE = [0.2126, 0.7152, 0.0722];
 
 /** Colour of luminance 1 of a black body. @param {BlackBodies} bodies @param {number} kelvin */
 function blackBody({ rangeK: [low, high], colours }, kelvin) {
   const at = (Math.log(kelvin / low) / Math.log(high / low)) * (colours.length - 1);
-  const i = Math.min(Math.max(Math.floor(at), 0), colours.length - 2);
+  const i = clamp(Math.floor(at), 0, colours.length - 2);
   return colours[i].map((value, c) => value + (at - i) * (colours[i + 1][c] - value));
 }
 
@@ -28,15 +30,18 @@ export function factorOf({ intensity, kelvin, colour }, bodies) {
 }
 
 /** WGSL that sums `count` textures. @param {number} count */
-const shader = (count) => `
+function shader(count) {
+  const parts = [...Array(count).keys()],
+    declared = parts.map((i) => `@group(0) @binding(${2 + i}) var part_${i}: texture_2d_array<f32>;`),
+    sum = parts.map((i) => `weights[${i}] * textureLoad(part_${i}, at.xy, at.z, 0)`);
+  return `
 @group(0) @binding(0) var mixed: texture_storage_2d_array<rgba16float, write>;
 @group(0) @binding(1) var<uniform> weights: array<vec4f, ${count}>;
-${Array.from({ length: count }, (_, i) => `@group(0) @binding(${2 + i}) var part_${i}: texture_2d_array<f32>;`).join("\n")}
+${declared.join("\n")}
 @compute @workgroup_size(${SIDE}, ${SIDE}) fn mix_parts(@builtin(global_invocation_id) at: vec3u) {
-    var total = vec4f();
-    ${Array.from({ length: count }, (_, i) => `total += weights[${i}] * textureLoad(part_${i}, at.xy, at.z, 0);`).join("\n    ")}
-    textureStore(mixed, at.xy, at.z, clamp(total, vec4f(), vec4f(${LARGEST})));
+    textureStore(mixed, at.xy, at.z, clamp(${sum.join(" + ")}, vec4f(), vec4f(${LARGEST})));
 }`;
+}
 
 /** @param {Factor[]} a @param {Factor[]} b */
 const areEqual = (a, b) => a.every((factor, i) => factor.every((value, c) => value === b[i][c]));
@@ -57,36 +62,34 @@ export function mixedNumbers(table, factors) {
 
 /** Shows mixes of the light of a state of the room. */
 export class Mixing {
-  /** @param {any} manifest @param {import("./objects.js").Objects} objects @param {Data} data */
+  /** @type {Map<number, GPUComputePipeline>} by how many parts they sum */ pipelines = new Map();
+  /** @type {Target[]} */ targets = [];
+  /** @type {Factor[]} of the state as exported */ own = [];
+  /** @type {Set<number>} groups whose parts are here */ loaded = new Set();
+  /** @type {Float32Array<ArrayBuffer> | null} numbers that a mix changes */ table = null;
+
+  /** @param {any} manifest @param {Objects} objects @param {Data} data */
   constructor(manifest, objects, data) {
     this.manifest = manifest;
     this.objects = objects;
     this.device = objects.device;
     this.data = data;
-    /** @type {Map<number, GPUComputePipeline>} by how many parts they sum */
-    this.pipelines = new Map();
-    /** @type {Target[]} */
-    this.targets = [];
-    /** @type {Factor[]} of the state as exported */
-    this.own = [];
   }
 
   /** Mix this state's light from now on. @param {number} number @param {Factor[]} own factors of its light as exported */
   take(number, own) {
-    const { mixing } = this.manifest.states[number],
-      { texture } = this.manifest.tables;
+    const { spans, numbers, textures } = this.manifest.states[number].mixing,
+      { texture } = this.manifest.tables,
+      usage = GPUTextureUsage.COPY_DST | GPUTextureUsage.COPY_SRC | GPUTextureUsage.TEXTURE_BINDING;
     this.own = own;
-    this.spans = mixing.spans;
-    /** @type {Piece} */
-    this.piece = mixing.numbers;
-    /** @type {Float32Array<ArrayBuffer> | null} */
+    this.spans = spans;
+    this.numbers = /** @type {Piece} */ (numbers);
     this.table = null;
-    /** @type {Set<number>} groups whose parts are here */
     this.loaded = new Set();
-    this.targets = mixing.textures.map((/** @type {any} */ { texture: at, layers, pieces }) => {
-      const [width, height] = texture[at].size;
-      const levels = texture[at].mipLevelCount ?? 1;
-      return { at, size: [width, height, layers], levels, pieces, parts: [], own: null, last: "" };
+    this.targets = textures.map((/** @type {any} */ { texture: at, layers, pieces }) => {
+      const { size, mipLevelCount, format } = texture[at],
+        described = { size: [size[0], size[1], layers], mipLevelCount, format, usage };
+      return { at, described, pieces, parts: [], own: null, last: "" };
     });
   }
 
@@ -99,52 +102,26 @@ export class Mixing {
 
   /** Fetch the parts of groups. @param {number[]} groups */
   async load(groups) {
-    const { targets, loaded } = this,
-      wanted = groups.filter((group) => !loaded?.has(group));
+    const { targets, loaded, device } = this,
+      wanted = groups.filter((group) => !loaded.has(group));
     if (!wanted.length) return;
-    const table = this.data.read(/** @type {Piece} */ (this.piece));
+    const table = this.data.read(/** @type {Piece} */ (this.numbers));
     const found = await Promise.all(
       targets.flatMap(({ pieces }) => wanted.map((group) => pieces[group] && this.data.read(pieces[group]))),
     );
     const numbers = new Float32Array(/** @type {ArrayBuffer} */ (await table));
-    await this.refine();
+    await this.objects.refined; // what a mix adds to is exact
     if (targets !== this.targets) return;
     this.table = numbers;
-    targets.forEach((target, i) =>
+    targets.forEach(({ described, parts }, i) =>
       wanted.forEach((group, k) => {
-        const content = found[i * wanted.length + k];
-        if (content && !loaded?.has(group))
-          target.parts[group] = this.part(target, /** @type {ArrayBuffer} */ (content));
+        const content = /** @type {ArrayBuffer} */ (found[i * wanted.length + k]);
+        if (!content || loaded.has(group)) return;
+        parts[group] = device.createTexture(described);
+        writeLevels(device, parts[group], described, content);
       }),
     );
-    wanted.forEach((group) => loaded?.add(group));
-  }
-
-  /** Replace stand-ins of the textures that are mixed. */
-  async refine() {
-    const { objects, targets } = this,
-      coarse = targets.map(({ at }) => at).filter((at) => objects.coarse.has(at));
-    const data = coarse.map((at) => this.data.read(this.manifest.tables.texture[at].data));
-    const contents = await Promise.all(data);
-    coarse.forEach((at, i) => objects.coarse.has(at) && objects.write("texture", at, contents[i]));
-  }
-
-  /** @param {Target} target */
-  create({ size, levels }) {
-    const usage = GPUTextureUsage.COPY_DST | GPUTextureUsage.COPY_SRC | GPUTextureUsage.TEXTURE_BINDING;
-    return this.device.createTexture({ size, mipLevelCount: levels, format: "rgba16float", usage });
-  }
-
-  /** A group's part of a texture. @param {Target} target @param {ArrayBuffer} content */
-  part(target, content) {
-    const texture = this.create(target);
-    let offset = 0;
-    for (const [mipLevel, [width, height, layers]] of sizes(target)) {
-      const layout = { offset, bytesPerRow: width * TEXEL, rowsPerImage: height };
-      this.device.queue.writeTexture({ texture, mipLevel }, content, layout, [width, height, layers]);
-      offset += width * height * layers * TEXEL;
-    }
-    return texture;
+    wanted.forEach((group) => loaded.add(group));
   }
 
   /** Show a mix whose groups are loaded; probes and skies only when it `rests`. @param {Factor[]} factors @param {boolean} rests */
@@ -178,36 +155,33 @@ export class Mixing {
     const key = JSON.stringify([keeps, used, used.map((group) => weights[group])]);
     if (key === target.last || (!own && !used.length && keeps)) return;
     target.last = key;
-    if (!own) target.own = this.copied(encoder, target);
-    const sources = [/** @type {GPUTexture} */ (target.own), ...used.map((group) => parts[group])];
+    target.own ??= this.copied(encoder, target);
+    const sources = [target.own, ...used.map((group) => parts[group])];
     const values = Float32Array.from([keeps, keeps, keeps, 1, ...used.flatMap((group) => weights[group])]);
-    const buffer = this.device.createBuffer({
-      size: values.byteLength,
-      usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST,
-    });
+    const usage = GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST;
+    const buffer = this.device.createBuffer({ size: values.byteLength, usage });
     this.device.queue.writeBuffer(buffer, 0, values);
     const pipeline = this.pipeline(sources.length),
       pass = encoder.beginComputePass();
     pass.setPipeline(pipeline);
-    for (const [baseMipLevel, [width, height, layers]] of sizes(target)) {
-      /** @param {GPUTexture} texture */
-      const view = (texture) =>
-        texture.createView({ dimension: "2d-array", baseMipLevel, mipLevelCount: 1, arrayLayerCount: layers });
+    levelsOf(target.described).forEach(([width, height, arrayLayerCount], baseMipLevel) => {
+      const view = (/** @type {GPUTexture} */ texture) =>
+        texture.createView({ dimension: "2d-array", baseMipLevel, mipLevelCount: 1, arrayLayerCount });
       const resources = [view(this.objects.made.texture[target.at]), { buffer }, ...sources.map(view)];
       const entries = resources.map((resource, binding) => ({ binding, resource }));
       pass.setBindGroup(0, this.device.createBindGroup({ layout: pipeline.getBindGroupLayout(0), entries }));
-      pass.dispatchWorkgroups(Math.ceil(width / SIDE), Math.ceil(height / SIDE), layers);
-    }
+      pass.dispatchWorkgroups(Math.ceil(width / SIDE), Math.ceil(height / SIDE), arrayLayerCount);
+    });
     pass.end();
   }
 
   /** A copy of a texture's own content. @param {GPUCommandEncoder} encoder @param {Target} target */
-  copied(encoder, target) {
-    const texture = this.create(target),
-      source = this.objects.made.texture[target.at];
-    for (const [mipLevel, size] of sizes(target)) {
-      encoder.copyTextureToTexture({ texture: source, mipLevel }, { texture, mipLevel }, size);
-    }
+  copied(encoder, { at, described }) {
+    const texture = this.device.createTexture(described),
+      source = this.objects.made.texture[at];
+    levelsOf(described).forEach((size, mipLevel) =>
+      encoder.copyTextureToTexture({ texture: source, mipLevel }, { texture, mipLevel }, size),
+    );
     return texture;
   }
 
@@ -222,7 +196,3 @@ export class Mixing {
     return found;
   }
 }
-
-/** Numbers of the levels, and their sizes. @param {Target} target @returns {[number, number[]][]} */
-const sizes = ({ size: [width, height, layers], levels }) =>
-  Array.from({ length: levels }, (_, k) => [k, [Math.max(1, width >> k), Math.max(1, height >> k), layers]]);

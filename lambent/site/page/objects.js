@@ -3,7 +3,8 @@
 import { BLOCKS, blocksLike, enlarged, readText } from "./loading.js";
 import { wholeWindow } from "./mirrors.js";
 
-/** @typedef {import("./loading.js").Data} Data */
+/** @import { Data } from "./loading.js" */
+/** @typedef {Record<string, Record<string, any>>} Changes of contents, by kind and place */
 
 export const CANVAS = "canvas";
 const AT_ONCE = 4; // files on their way: enough to fill a line, so few that the first is there first
@@ -15,6 +16,22 @@ function blockOf(format) {
   if (format === BLOCKS) return [16, 4];
   const parts = WORDS.includes(format) ? null : /^([rgba]+)(8|16|32)/.exec(format);
   return [parts ? (parts[1].length * Number(parts[2])) / 8 : 4, 1];
+}
+
+/** Sizes of the levels of a texture: columns, rows, layers. @param {any} described @returns {[number, number, number][]} */
+export const levelsOf = ({ size: [width, height, layers = 1], mipLevelCount = 1 }) =>
+  Array.from({ length: mipLevelCount }, (_, k) => [Math.max(1, width >> k), Math.max(1, height >> k), layers]);
+
+/** Write the levels of a texture, one after the other. @param {GPUDevice} device @param {GPUTexture} texture @param {any} described @param {ArrayBuffer} content */
+export function writeLevels(device, texture, described, content) {
+  const [bytes, side] = blockOf(described.format);
+  let offset = 0;
+  levelsOf(described).forEach(([width, height, layers], mipLevel) => {
+    const [columns, rows] = [width, height].map((texels) => Math.ceil(texels / side));
+    const layout = { offset, bytesPerRow: columns * bytes, rowsPerImage: rows };
+    device.queue.writeTexture({ texture, mipLevel }, content, layout, [columns * side, rows * side, layers]);
+    offset += columns * rows * bytes * layers;
+  });
 }
 
 const FILL_DEPTH = `
@@ -29,46 +46,39 @@ override LAYER: i32;
 
 /** Objects by kind and place, as in the tables of a manifest. */
 export class Objects {
+  /** @type {Record<string, any[]>} */ made = {};
+  /** @type {Record<string, number>} how many are made, by kind */ counts = {};
+  width = 0;
+  height = 0;
+  /** @type {Changes} contents other than the tables say */ changed = {};
+  /** @type {Set<number>} places of textures that stand-ins fill */ coarse = new Set();
+  /** @type {Promise<any>} none of them is left */ refined = Promise.resolve();
+  /** @type {Promise<void>} one state's objects are made after another's */ loaded = Promise.resolve();
+  leave = () => {}; // called before contents become another state's, to undo what else wrote into them
+
   /** @param {any} manifest @param {GPUDevice} device */
   constructor(manifest, device) {
     this.manifest = manifest;
     this.device = device;
-    /** @type {Record<string, any[]>} */
-    this.made = {};
-    /** @type {Record<string, number>} how many are made, by kind */
-    this.counts = {};
-    this.width = this.height = 0;
-    /** @type {Record<string, Record<string, any>>} contents other than the tables say, by kind and place */
-    this.changed = {};
-    /** @type {Set<number>} places of textures that stand-ins fill */
-    this.coarse = new Set();
-    /** @type {Promise<any>} none of them is left */
-    this.refined = Promise.resolve();
-    /** @type {Promise<void>} one state's objects are made after another's */
-    this.loaded = Promise.resolve();
-    this.leave = () => {}; // called before contents become another state's, to undo what else wrote into them
   }
 
   /**
    * Make the objects that a state counts, and write the contents in which it differs; false if another is wanted meanwhile.
-   * @param {Record<string, number>} counts @param {Record<string, Record<string, any>>} changes @param {Data} data
-   * @param {() => boolean} isWanted
+   * @param {Record<string, number>} counts @param {Changes} changes @param {Data} data @param {() => boolean} isWanted
    */
   async show(counts, changes, data, isWanted) {
     const load = () => this.load(counts, data);
     await (this.loaded = this.loaded.then(load, load));
-    /** @type {[string, number, any][]} kind, place and data of what differs from what is shown */
-    const differ = [];
-    for (const [kind, places] of Object.entries(this.changed)) {
-      for (const at of Object.keys(places)) differ.push([kind, Number(at), this.manifest.tables[kind][at].data]);
-    }
-    for (const [kind, places] of Object.entries(changes)) {
-      for (const [at, piece] of Object.entries(places)) differ.push([kind, Number(at), piece]);
-    }
-    const contents = await Promise.all(differ.map(([, , piece]) => data.read(piece)));
+    const listed = (/** @type {Changes} */ ones) =>
+      Object.entries(ones).flatMap(([kind, places]) =>
+        Object.entries(places).map(([at, piece]) => ({ kind, at: Number(at), piece })),
+      );
+    const back = listed(this.changed).map((one) => ({ ...one, piece: this.manifest.tables[one.kind][one.at].data })),
+      differ = [...back, ...listed(changes)];
+    const contents = await Promise.all(differ.map(({ piece }) => data.read(piece)));
     if (!isWanted()) return false;
     this.leave();
-    differ.forEach(([kind, at], i) => this.write(kind, at, contents[i]));
+    differ.forEach(({ kind, at }, i) => this.write(kind, at, contents[i]));
     this.changed = changes;
     return true;
   }
@@ -76,14 +86,14 @@ export class Objects {
   /** Make the objects of the tables up to these counts. @param {Record<string, number>} counts @param {Data} data */
   async load(counts, data) {
     const { device, made } = this;
-    /** @param {string} kind @returns {any[]} */
-    const lacking = (kind) => (this.manifest.tables[kind] ?? []).slice(made[kind]?.length ?? 0, counts[kind] ?? 0);
-    /** @param {string} kind @param {any[]} found */
-    const add = (kind, found) => (made[kind] = [...(made[kind] ?? []), ...found]);
+    const lacking = (/** @type {string} */ kind) =>
+      /** @type {any[]} */ (this.manifest.tables[kind] ?? []).slice(made[kind]?.length ?? 0, counts[kind] ?? 0);
+    const add = (/** @type {string} */ kind, /** @type {any[]} */ found) =>
+      (made[kind] = [...(made[kind] ?? []), ...found]);
     const [modules, buffers, textures] = await Promise.all([
       Promise.all(lacking("shader_module").map((one) => readText(one.file))),
-      Promise.all(lacking("buffer").map((one) => (one.data ? data.read(one.data) : null))),
-      Promise.all(lacking("texture").map((one) => (one.data ? data.read(one.data.standin ?? one.data) : null))),
+      Promise.all(lacking("buffer").map(({ data: piece }) => piece && data.read(piece))),
+      Promise.all(lacking("texture").map(({ data: piece }) => piece && data.read(piece.standin ?? piece))),
     ]);
     const shaders = modules.map((code) => device.createShaderModule({ code }));
     add("shader_module", shaders);
@@ -93,30 +103,21 @@ export class Objects {
       add(kind, ones);
       contents.forEach((content, i) => content && this.begin(kind, first + i, content));
     }
-    const inPlaces = (/** @type {any} */ one) => ({ ...one, module: made.shader_module[one.module] });
-    /** @type {[string, (one: any) => any][]} */
-    const makers = [
-      ["sampler", (one) => device.createSampler(one)],
-      ["bind_group_layout", (one) => device.createBindGroupLayout(one)],
-      [
-        "pipeline_layout",
-        ({ bindGroupLayouts: places }) =>
-          device.createPipelineLayout({
-            bindGroupLayouts: places.map((/** @type {number} */ at) => made.bind_group_layout[at]),
-          }),
-      ],
-      [
-        "render_pipeline",
-        ({ layout, vertex, fragment, ...one }) =>
-          device.createRenderPipelineAsync({
-            ...one,
-            layout: made.pipeline_layout[layout],
-            vertex: inPlaces(vertex),
-            ...(fragment ? { fragment: inPlaces(fragment) } : {}),
-          }),
-      ],
-    ];
-    for (const [kind, make] of makers) add(kind, await Promise.all(lacking(kind).map(make)));
+    const inPlaces = (/** @type {any} */ one) => one && { ...one, module: made.shader_module[one.module] };
+    /** @type {Record<string, (one: any) => any>} in the order in which they need each other */
+    const makers = {
+      sampler: (one) => device.createSampler(one),
+      bind_group_layout: (one) => device.createBindGroupLayout(one),
+      pipeline_layout: ({ bindGroupLayouts: places }) => {
+        const bindGroupLayouts = places.map((/** @type {number} */ at) => made.bind_group_layout[at]);
+        return device.createPipelineLayout({ bindGroupLayouts });
+      },
+      render_pipeline: ({ layout, vertex, fragment, ...one }) => {
+        const stages = { vertex: inPlaces(vertex), fragment: inPlaces(fragment) };
+        return device.createRenderPipelineAsync({ ...one, ...stages, layout: made.pipeline_layout[layout] });
+      },
+    };
+    for (const [kind, make] of Object.entries(makers)) add(kind, await Promise.all(lacking(kind).map(make)));
     this.counts = counts;
   }
 
@@ -165,39 +166,22 @@ export class Objects {
     if (kind === "texture") this.coarse.delete(at);
     if (content instanceof ImageBitmap) return this.copy(one, made, content);
     if (kind === "buffer") return this.device.queue.writeBuffer(made, 0, content);
-    const isDepth = one.format === "depth32float";
-    const target = isDepth
-      ? this.device.createTexture({
-          size: one.size,
-          format: "r32float",
-          usage: GPUTextureUsage.COPY_DST | GPUTextureUsage.TEXTURE_BINDING,
-        })
-      : made;
-    const [bytes, side] = blockOf(one.format);
-    const [width, height, layers = 1] = one.size;
-    for (let level = 0, offset = 0; level < (one.mipLevelCount ?? 1); level++) {
-      const columns = Math.ceil(Math.max(1, width >> level) / side),
-        rows = Math.ceil(Math.max(1, height >> level) / side);
-      this.device.queue.writeTexture(
-        { texture: target, mipLevel: level },
-        content,
-        { offset, bytesPerRow: columns * bytes, rowsPerImage: rows },
-        [columns * side, rows * side, layers],
-      );
-      offset += columns * rows * bytes * layers;
-    }
-    if (isDepth) this.fillDepth(target, made, layers);
+    const { size, format } = one,
+      isDepth = format === "depth32float",
+      usage = GPUTextureUsage.COPY_DST | GPUTextureUsage.TEXTURE_BINDING;
+    const target = isDepth ? this.device.createTexture({ size, format: "r32float", usage }) : made;
+    writeLevels(this.device, target, one, content);
+    if (isDepth) this.fillDepth(target, made, size[2] ?? 1);
   }
 
   /** The levels of a picture, one below the other. @param {any} one @param {GPUTexture} to @param {ImageBitmap} source */
   copy(one, to, source) {
-    const [width, height] = one.size;
-    for (let level = 0, y = 0; level < (one.mipLevelCount ?? 1); level++) {
-      const size = [Math.max(1, width >> level), Math.max(1, height >> level)];
-      const target = { texture: to, mipLevel: level };
-      this.device.queue.copyExternalImageToTexture({ source, origin: [0, y] }, target, size);
-      y += size[1];
-    }
+    let y = 0;
+    levelsOf(one).forEach(([width, height], mipLevel) => {
+      const target = { texture: to, mipLevel };
+      this.device.queue.copyExternalImageToTexture({ source, origin: [0, y] }, target, [width, height]);
+      y += height;
+    });
   }
 
   /** Depth cannot be written, only drawn. @param {GPUTexture} from @param {GPUTexture} to @param {number} layers */
@@ -229,30 +213,26 @@ export class Objects {
 
   /** Make the textures of a size, all views and all groups. @param {number} width @param {number} height */
   fit(width, height) {
-    const { made, device, counts } = this,
-      tables = this.manifest.tables;
-    const isOther = width !== this.width || height !== this.height;
+    const { made, device } = this,
+      isOther = width !== this.width || height !== this.height,
+      { wide } = wholeWindow([width, height]);
+    const counted = (/** @type {string} */ kind) =>
+      /** @type {any[]} */ (this.manifest.tables[kind]).slice(0, this.counts[kind]);
     [this.width, this.height] = [width, height];
-    const { wide } = wholeWindow([width, height]);
-    tables.texture.slice(0, counts.texture).forEach((/** @type {any} */ one, /** @type {number} */ at) => {
+    counted("texture").forEach((one, at) => {
       if (one.data || (made.texture[at] && !isOther)) return;
       made.texture[at]?.destroy();
-      const size = one.size.map((/** @type {any} */ n, /** @type {number} */ i) =>
-        n === CANVAS ? [width, height][i] : n === MIRROR ? wide[i] : n,
-      );
+      /** @type {(number | string)[]} */
+      const sides = one.size,
+        size = sides.map((n, i) => (n === CANVAS ? [width, height][i] : n === MIRROR ? wide[i] : n));
       made.texture[at] = device.createTexture({ ...one, size });
     });
-    made.view = tables.view
-      .slice(0, counts.view)
-      .map((/** @type {any} */ { texture, ...one }) => made.texture[texture].createView(one));
-    made.bind_group = tables.bind_group.slice(0, counts.bind_group).map((/** @type {any} */ one) =>
-      device.createBindGroup({
-        layout: made.bind_group_layout[one.layout],
-        entries: one.entries.map((/** @type {any} */ { binding, buffer, view, sampler }) => ({
-          binding,
-          resource: made.view[view] ?? made.sampler[sampler] ?? { buffer: made.buffer[buffer] },
-        })),
-      }),
-    );
+    made.view = counted("view").map(({ texture, ...one }) => made.texture[texture].createView(one));
+    const resourceOf = (/** @type {any} */ { buffer, view, sampler }) =>
+      made.view[view] ?? made.sampler[sampler] ?? { buffer: made.buffer[buffer] };
+    made.bind_group = counted("bind_group").map((one) => {
+      const entries = one.entries.map((/** @type {any} */ entry) => ({ ...entry, resource: resourceOf(entry) }));
+      return device.createBindGroup({ layout: made.bind_group_layout[one.layout], entries });
+    });
   }
 }
