@@ -91,15 +91,15 @@ class Chunks:
         name = f"data/{digest[:20]}.{form}"
         (self._folder.parent / name).write_bytes(content)
         self.files[name] = size = len(content)
-        return {"file": name, "bytes": size, "packed": size, "sha256": digest, "picture": True}
+        return {"file": name, "bytes": size, "packed": size, "picture": True}
 
     def add(self, data: bytes, packing: Packing | None = None) -> dict[str, Any]:
-        """Where `data` is: a file relative to the site, bytes unpacked and packed, SHA-256, packing."""
+        """Where `data` is: a file relative to the site, bytes unpacked and packed, packing; its name has the SHA-256 of `data`."""
         digest = hashlib.sha256(data).hexdigest()
         name = f"data/{digest[:20]}.gz"
         if name not in self._added:
             packed = gzip.compress(data if packing is None else packing.packed(data), LEVEL, mtime=0)
-            found: dict[str, Any] = {"file": name, "bytes": len(data), "packed": len(packed), "sha256": digest}
+            found: dict[str, Any] = {"file": name, "bytes": len(data), "packed": len(packed)}
             if len(packed) <= INLINE:
                 found["inline"] = base64.b64encode(packed).decode()
             else:

@@ -76,7 +76,7 @@ class Manifest:
         changes = defaultdict[str, dict[int, Any]](dict)
         for (kind, at), before in known.items():
             now = self._content(self._data[kind, at])
-            if now["sha256"] != before["sha256"]:
+            if now["file"] != before["file"]:
                 changes[kind][at] = now
         counts = {kind: len(table) for kind, table in self.tables.items()}
         return {

@@ -61,7 +61,7 @@ def test_every_file_is_there_and_holds_what_the_manifest_says(box_site):
     pieces += [piece["blocks"] for piece in pieces if "blocks" in piece]
     for piece in pieces:
         data = unpacked(box_site, piece)
-        assert len(data) == piece["bytes"] and hashlib.sha256(data).hexdigest() == piece["sha256"]
+        assert len(data) == piece["bytes"] and hashlib.sha256(data).hexdigest()[:20] in piece["file"]
         assert "inline" in piece or (box_site / piece["file"]).stat().st_size == piece["packed"]
     assert all((box_site / one["file"]).is_file() for one in manifest["tables"]["shader_module"])
     assert all((box_site / name).is_file() for name in ("index.html", "main.js", "site.css", "poster.jpg"))
@@ -95,7 +95,7 @@ def test_states_hold_what_differs(box_site):
     assert "rgba16float" in changed, "the light map"
     assert all(blue["counts"][kind] >= count for kind, count in baked["counts"].items())
     pieces = [piece for kind in blue["changes"].values() for piece in kind.values()]
-    assert all(hashlib.sha256(unpacked(box_site, piece)).hexdigest() == piece["sha256"] for piece in pieces)
+    assert all(hashlib.sha256(unpacked(box_site, piece)).hexdigest()[:20] in piece["file"] for piece in pieces)
 
 
 def test_a_frame_as_data_draws_what_the_renderer_draws(device, baked_box):

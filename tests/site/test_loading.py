@@ -93,9 +93,9 @@ def test_stand_ins_of_blocks_have_their_colour(javascript):
     """As the decoder of light fields reads them: each block has the colour of the texel in its corner."""
     levels = [np.random.default_rng(6).uniform(0, 9, (6, 32 >> k, 32 >> k, 4)).astype(np.float16) for k in range(6)]
     finest, coarse = standin("rgba16float", (32, 32, 6), [level.tobytes() for level in levels])
-    code = """import {blocksLike} from './loading.js';
+    code = """import {enlarged, inBlocks} from './loading.js';
     const bytes = new Uint8Array(Buffer.from(given.data, 'base64')).buffer;
-    say(Buffer.from(blocksLike(bytes, given.size, given.levels, given.finest)).toString('base64'));"""
+    say(Buffer.from(inBlocks(enlarged(bytes, given.size, given.levels, given.finest, 8, 4))).toString('base64'));"""
     given = {"data": encoded(b"".join(coarse)), "size": (32, 32, 6), "levels": 6, "finest": finest}
     words, at = np.frombuffer(base64.b64decode(javascript(code, given)), np.uint32), 0
     for k, level in enumerate(levels):

@@ -1,5 +1,7 @@
 // Reads the manifest of a site, and its files of data.
 
+import { clamp } from "./vectors.js";
+
 /** A fault that a person can do something about. */
 export class SiteError extends Error {}
 
@@ -34,7 +36,7 @@ export async function readText(file) {
 }
 
 /** @typedef {{word: 1|2|4, channels: number, runs: [number, number][]}} Packing */
-/** @typedef {{file: string, bytes: number, packed: number, sha256: string, packing?: Packing, units?: number[], picture?: boolean, inline?: string, blocks?: Piece, standin?: any}} Piece */
+/** @typedef {{file: string, bytes: number, packed: number, packing?: Packing, units?: number[], picture?: boolean, inline?: string, blocks?: Piece, standin?: any}} Piece */
 
 export const BLOCKS = "bc6h-rgb-ufloat";
 const STEPS = 32767; // of an octahedron's square
@@ -91,31 +93,47 @@ export function vertices(data, channels, units) {
   return found.buffer;
 }
 
+/** Sizes of the levels of a texture: columns, rows, layers. @param {any} described @returns {[number, number, number][]} */
+export const levelsOf = ({ size: [width, height, layers = 1], mipLevelCount = 1 }) =>
+  Array.from({ length: mipLevelCount }, (_, k) => [Math.max(1, width >> k), Math.max(1, height >> k), layers]);
+
 /**
- * All levels of a texture of its stand-in, whose first level is the `finest`: each texel by the one that covers it.
- * @param {ArrayBuffer} standin @param {number[]} size @param {number} levels @param {number} finest @param {number} bytes a texel
+ * All levels of a texture of its stand-in, whose first level is the `finest`: each texel by the one that covers it, or one
+ * for the corner of each block of `side` texels.
+ * @param {ArrayBuffer} standin @param {number[]} size @param {number} levels @param {number} finest
+ * @param {number} bytes a texel @param {number} side
  */
-export function enlarged(standin, [width, height, layers = 1], levels, finest, bytes) {
+export function enlarged(standin, size, levels, finest, bytes, side = 1) {
   const Words = bytes % 4 ? (bytes % 2 ? Uint8Array : Uint16Array) : Uint32Array,
-    words = bytes / Words.BYTES_PER_ELEMENT;
-  const sides = Array.from({ length: Math.max(levels, finest + 1) }, (_, level) =>
-    [width, height].map((side) => Math.max(1, side >> level)),
-  );
-  const texels = sides.slice(0, levels).reduce((sum, [w, h]) => sum + w * h * layers, 0);
+    words = bytes / Words.BYTES_PER_ELEMENT,
+    sizes = levelsOf({ size, mipLevelCount: Math.max(levels, finest + 1) }),
+    blocks = sizes.slice(0, levels).map(([w, h, layers]) => [Math.ceil(w / side), Math.ceil(h / side), layers]);
   const from = new Words(standin),
-    found = new Words(texels * words);
-  for (let level = 0, to = 0, first = 0; level < levels; level++) {
-    const source = Math.max(level, finest),
-      shift = source - level;
-    const [[w, h], [sw, sh]] = [sides[level], sides[source]];
+    found = new Words(blocks.reduce((sum, [w, h, layers]) => sum + w * h * layers * words, 0));
+  let [to, first] = [0, 0];
+  blocks.forEach(([w, h, layers], level) => {
+    const [sw, sh] = sizes[Math.max(level, finest)],
+      shift = Math.max(finest - level, 0);
     for (let row = 0; row < h * layers; row++) {
-      const line = first + (Math.floor(row / h) * sh + Math.min(row % h >> shift, sh - 1)) * sw * words;
+      const line = first + (Math.floor(row / h) * sh + Math.min((side * (row % h)) >> shift, sh - 1)) * sw * words;
       for (let x = 0; x < w; x++) {
-        const at = line + Math.min(x >> shift, sw - 1) * words;
+        const at = line + Math.min((side * x) >> shift, sw - 1) * words;
         for (let i = 0; i < words; i++) found[to++] = from[at + i];
       }
     }
     if (level >= finest) first += sw * sh * layers * words;
+  });
+  return found.buffer;
+}
+
+/** Blocks of BC6H, each of the one colour of a texel of half floats. @param {ArrayBuffer} texels */
+export function inBlocks(texels) {
+  const from = new Uint16Array(texels),
+    found = new Uint32Array(from.length);
+  for (let i = 0; i < from.length; i += 4) {
+    const [r, g, b] = [0, 1, 2].map((channel) => clamp(Math.round((from[i + channel] - 15) / 31), 0, 1023));
+    found[i] = 3 | (r << 5) | (g << 15) | (b << 25); // mode 11: both ends in 10 bits, all texels at the first
+    found[i + 1] = b >> 7;
   }
   return found.buffer;
 }
@@ -131,34 +149,6 @@ export function takeBlocks({ tables, states }) {
   for (const { changes } of states) {
     for (const [at, piece] of Object.entries(changes.texture ?? {})) changes.texture[at] = taken(piece);
   }
-}
-
-/**
- * Levels of a texture in blocks of BC6H from its stand-in, half floats of which the first level is the `finest`: each block
- * of the one colour that is in its corner.
- * @param {ArrayBuffer} standin @param {number[]} size @param {number} levels @param {number} finest
- */
-export function blocksLike(standin, [width, , layers = 1], levels, finest) {
-  const from = new Uint16Array(standin),
-    sides = Array.from({ length: Math.max(levels, finest + 1) }, (_, level) => Math.max(1, width >> level)),
-    across = sides.map((side) => Math.ceil(side / 4));
-  const found = new Uint32Array(across.slice(0, levels).reduce((sum, n) => sum + 4 * n * n * layers, 0));
-  for (let level = 0, to = 0, first = 0; level < levels; level++) {
-    const source = Math.max(level, finest),
-      [side, shift] = [sides[source], source - level];
-    for (let row = 0; row < across[level] * layers; row++) {
-      const layer = Math.floor(row / across[level]),
-        line = layer * side + Math.min((4 * (row % across[level])) >> shift, side - 1);
-      for (let x = 0; x < across[level]; x++, to += 4) {
-        const at = first + 4 * (line * side + Math.min((4 * x) >> shift, side - 1));
-        const [r, g, b] = [0, 1, 2].map((i) => Math.min(Math.max(Math.round((from[at + i] - 15) / 31), 0), 1023));
-        found[to] = 3 | (r << 5) | (g << 15) | (b << 25); // mode 11: both ends in 10 bits, all texels at the first
-        found[to + 1] = b >> 7;
-      }
-    }
-    if (level >= finest) first += 4 * side * side * layers;
-  }
-  return found.buffer;
 }
 
 /** Files whose content is needed again once it is on the GPU: what states change. @param {any} manifest @returns {Set<string>} */
@@ -197,11 +187,10 @@ export class Data {
 
   /** @param {Piece} piece @returns {Promise<ArrayBuffer | ImageBitmap>} */
   async unpacked(piece) {
+    const answer = piece.inline ? new Response(bytesIn(piece.inline)) : await fetched(piece.file);
     let packed;
-    if (piece.inline) packed = new Blob([Uint8Array.from(atob(piece.inline), (one) => one.charCodeAt(0))]);
-    const answer = packed ? null : await fetched(piece.file);
     try {
-      packed ??= await /** @type {Response} */ (answer).blob();
+      packed = await answer.blob();
     } catch {
       throw new FileError(`${piece.file} did not arrive whole; is the server still there?`);
     }
@@ -215,13 +204,14 @@ export class Data {
 /** @param {Blob} packed @returns {Promise<ImageBitmap>} */
 const picture = (packed) => createImageBitmap(packed, { premultiplyAlpha: "none", colorSpaceConversion: "none" });
 
-/** The content of a file; null if it is not what the manifest says. @param {Piece} piece @param {Blob} packed */
-async function bytesOf(piece, packed) {
-  const { bytes, sha256, packing, units } = piece;
-  let data = await new Response(packed.stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
-  if (packing) data = unpack(new Uint8Array(data), packing);
-  const digest = globalThis.crypto?.subtle && new Uint8Array(await crypto.subtle.digest("SHA-256", data));
-  const hex = digest && Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
-  if (data.byteLength !== bytes || (hex && hex !== sha256)) return null;
-  return packing && units ? vertices(data, packing.channels, units) : data;
+/** @param {string} text in base 64 */
+const bytesIn = (text) => Uint8Array.from(atob(text), (one) => one.charCodeAt(0));
+
+/** The content of a file; null if it is not as long as the manifest says. Others that gzip's own sum betrays are errors. @param {Piece} piece @param {Blob} packed */
+async function bytesOf({ bytes, packing, units }, packed) {
+  const words = packed.stream().pipeThrough(new DecompressionStream("gzip")),
+    data = await new Response(words).arrayBuffer();
+  if (data.byteLength !== bytes) return null;
+  const found = packing ? unpack(new Uint8Array(data), packing) : data;
+  return packing && units ? vertices(found, packing.channels, units) : found;
 }

@@ -1,6 +1,7 @@
 // Mixes the light groups of a room. Light adds up: what a mix changes are sums of each group's part times its factor.
 
-import { levelsOf, writeLevels } from "./objects.js";
+import { levelsOf } from "./loading.js";
+import { writeLevels } from "./objects.js";
 import { clamp } from "./vectors.js";
 
 /** @import { Data, Piece } from "./loading.js" */

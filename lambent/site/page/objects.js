@@ -1,12 +1,13 @@
 // The objects of WebGPU that a manifest describes, and their contents.
 
-import { BLOCKS, blocksLike, enlarged, readText } from "./loading.js";
+import { BLOCKS, enlarged, inBlocks, levelsOf, readText } from "./loading.js";
 import { wholeWindow } from "./mirrors.js";
 
 /** @import { Data } from "./loading.js" */
 /** @typedef {Record<string, Record<string, any>>} Changes of contents, by kind and place */
 
 export const CANVAS = "canvas";
+const HALVES = 8; // bytes of a texel of four half floats
 const AT_ONCE = 4; // files on their way: enough to fill a line, so few that the first is there first
 const MIRROR = "mirror"; // size of the buffers of mirrored views
 const WORDS = ["rgb10a2unorm", "rgb9e5ufloat", "depth32float"]; // of 4 bytes a texel
@@ -17,10 +18,6 @@ function blockOf(format) {
   const parts = WORDS.includes(format) ? null : /^([rgba]+)(8|16|32)/.exec(format);
   return [parts ? (parts[1].length * Number(parts[2])) / 8 : 4, 1];
 }
-
-/** Sizes of the levels of a texture: columns, rows, layers. @param {any} described @returns {[number, number, number][]} */
-export const levelsOf = ({ size: [width, height, layers = 1], mipLevelCount = 1 }) =>
-  Array.from({ length: mipLevelCount }, (_, k) => [Math.max(1, width >> k), Math.max(1, height >> k), layers]);
 
 /** Write the levels of a texture, one after the other. @param {GPUDevice} device @param {GPUTexture} texture @param {any} described @param {ArrayBuffer} content */
 export function writeLevels(device, texture, described, content) {
@@ -126,10 +123,10 @@ export class Objects {
     const { data, size, format, mipLevelCount = 1 } = this.manifest.tables[kind][at];
     if (!data.standin) return this.write(kind, at, content);
     const { finest } = data.standin;
-    const isInBlocks = format === BLOCKS;
-    const whole = isInBlocks
-      ? blocksLike(content, size, mipLevelCount, finest)
-      : enlarged(content, size, mipLevelCount, finest, blockOf(format)[0]);
+    const whole =
+      format === BLOCKS
+        ? inBlocks(enlarged(content, size, mipLevelCount, finest, HALVES, 4))
+        : enlarged(content, size, mipLevelCount, finest, blockOf(format)[0]);
     this.write(kind, at, whole);
     this.coarse.add(at);
   }
