@@ -94,7 +94,7 @@ class Chunks:
         return {"file": name, "bytes": size, "packed": size, "picture": True}
 
     def add(self, data: bytes, packing: Packing | None = None) -> dict[str, Any]:
-        """Where `data` is: a file relative to the site, bytes unpacked and packed, packing; its name has the SHA-256 of `data`."""
+        """Where `data` is: a file relative to the site, named by its SHA-256, bytes unpacked and packed, packing."""
         digest = hashlib.sha256(data).hexdigest()
         name = f"data/{digest[:20]}.gz"
         if name not in self._added:

@@ -1,6 +1,6 @@
 // What a shared link holds: the camera, and what differs from the room as exported.
 
-/** @typedef {import("./camera.js").Camera} Camera */
+/** @import { Camera } from "./camera.js" */
 /** @typedef {Record<string, number | number[]>} Light factors by light group */
 /** @typedef {{camera: Camera, state: number, exposureEv: number, viewTransform: number, light: Light}} Shared */
 

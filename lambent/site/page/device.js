@@ -2,12 +2,7 @@
 
 import { SiteError, takeBlocks } from "./loading.js";
 
-/** What a browser lacks, in a line; null if nothing. @param {any} manifest @param {GPUAdapter} adapter */
-function lacking(manifest, adapter) {
-  const blocks = manifest.tables.texture.some((/** @type {any} */ one) => one.format.startsWith("bc"));
-  return blocks && !adapter.features.has("texture-compression-bc") ? "compressed textures (BC)" : null;
-}
-
+const BLOCKS_FEATURE = "texture-compression-bc";
 /** @type {Record<string, string>} what of a room a limit of an adapter is for */
 const LIMITS = {
   maxTextureDimension2D: "texels a side of a texture",
@@ -34,14 +29,16 @@ function missing() {
 export async function openDevice(manifest) {
   const adapter = await navigator.gpu?.requestAdapter({ powerPreference: "high-performance" });
   if (!adapter) throw new SiteError(missing());
-  const lack = lacking(manifest, adapter);
-  if (lack) throw new SiteError(`This graphics adapter has no ${lack}.`);
+  const hasBlocks = adapter.features.has(BLOCKS_FEATURE);
+  if (!hasBlocks && manifest.tables.texture.some((/** @type {any} */ { format }) => format.startsWith("bc"))) {
+    throw new SiteError("This graphics adapter has no compressed textures (BC).");
+  }
   const excess = beyond(manifest.needs, adapter.limits);
   if (excess) throw new SiteError(excess);
   /** @type {GPUFeatureName[]} */
-  const wanted = ["texture-compression-bc", "float32-filterable"];
+  const wanted = [BLOCKS_FEATURE, "float32-filterable"];
   const most = Math.max(manifest.needs.maxBufferSize, 1 << 27);
-  if (adapter.features.has("texture-compression-bc")) takeBlocks(manifest);
+  if (hasBlocks) takeBlocks(manifest);
   return adapter.requestDevice({
     requiredFeatures: wanted.filter((one) => adapter.features.has(one)),
     requiredLimits: {

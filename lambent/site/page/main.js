@@ -3,6 +3,7 @@
 import { openCard } from "./card.js";
 import { openPanel } from "./controls.js";
 import { openDevice } from "./device.js";
+import { found } from "./elements.js";
 import { Frame } from "./frame.js";
 import { follow } from "./input.js";
 import { offerLights } from "./lights.js";
@@ -11,26 +12,21 @@ import { failed, forgive, tell, tellRest } from "./messages.js";
 import { readGeometry } from "./picking.js";
 import { Visit } from "./visit.js";
 
-const canvas = /** @type {HTMLCanvasElement} */ (document.getElementById("picture"));
+const canvas = /** @type {HTMLCanvasElement} */ (found("picture"));
 const MB = 1e6;
 
 /** Bytes of the files that the first state needs. @param {any} manifest @returns {number} */
 function packedBytes(manifest) {
   const { counts } = manifest.states[0];
-  const pieces = ["buffer", "texture"].flatMap((kind) =>
-    manifest.tables[kind]
-      .slice(0, counts[kind])
-      .flatMap((/** @type {any} */ { data }) => (data ? [data, data.standin ?? []].flat() : [])),
-  );
+  const ones = ["buffer", "texture"].flatMap((kind) => manifest.tables[kind].slice(0, counts[kind])),
+    pieces = ones.flatMap(({ data }) => (data ? [data, data.standin ?? []].flat() : []));
   return [...new Map(pieces.map((piece) => [piece.file, piece.packed])).values()].reduce((a, b) => a + b, 0);
 }
 
 /** Say what is to be seen, before it is. @param {any} manifest */
 function entitle({ name, visit: { caption } }) {
   document.title = caption || name;
-  const description = caption ? `${name}: ${caption}` : name;
-  canvas.setAttribute("aria-label", description);
-  document.getElementById("poster")?.setAttribute("alt", description);
+  canvas.ariaLabel = found("poster").alt = caption ? `${name}: ${caption}` : name;
 }
 
 /** Load the room: it is shown with stand-ins for large textures first, then with all that it consists of. */
@@ -87,8 +83,8 @@ const attempt = (act) => act().then(() => tellRest(""), failed);
 let visit;
 /** @type {Frame | undefined} that shows the room on the present device */
 let shown;
-document.getElementById("again")?.addEventListener("click", () => {
+found("again").onclick = () => {
   forgive();
   attempt(again);
-});
+};
 attempt(open);
