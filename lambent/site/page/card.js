@@ -40,11 +40,9 @@ function offerFinishes(visit, material, now) {
     isFocused = list.contains(document.activeElement);
   const choose = (/** @type {number} */ i) =>
     visit.choose(stateWith(visit.manifest, visit.state, material, offered[i].finish), offered[i].label);
-  offer(
-    "finishes",
-    offered.map(({ label }) => label),
-    choose,
-  )(place);
+  const names = offered.map(({ label }) => label),
+    mark = offer("finishes", names, choose);
+  mark(place);
   list.hidden = offered.length < 2;
   if (isFocused) list.children[place].focus();
 }

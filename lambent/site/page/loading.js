@@ -37,6 +37,7 @@ export async function readText(file) {
 
 /** @typedef {{word: 1|2|4, channels: number, runs: [number, number][]}} Packing */
 /** @typedef {{file: string, bytes: number, packed: number, packing?: Packing, units?: number[], picture?: boolean, inline?: string, blocks?: Piece, standin?: any}} Piece */
+/** @typedef {Record<string, Record<string, Piece>>} Changes of contents, by kind and place */
 
 export const BLOCKS = "bc6h-rgb-ufloat";
 const STEPS = 32767; // of an octahedron's square
@@ -151,15 +152,21 @@ export function takeBlocks({ tables, states }) {
   }
 }
 
+/** What changes: kinds and places of objects, and pieces. @param {Changes} changes */
+export const listed = (changes) =>
+  Object.entries(changes).flatMap(([kind, places]) =>
+    Object.entries(places).map(([at, piece]) => ({ kind, at: Number(at), piece })),
+  );
+
 /** Files whose content is needed again once it is on the GPU: what states change. @param {any} manifest @returns {Set<string>} */
 export function neededAgain({ tables, states }) {
-  const files = new Set();
-  for (const { changes } of states) {
-    for (const [kind, places] of Object.entries(changes)) {
-      for (const [at, piece] of Object.entries(places)) files.add(piece.file).add(tables[kind][at].data.file);
-    }
-  }
-  return files;
+  const ones = states.map((/** @type {any} */ one) => listed(one.changes));
+  return new Set(
+    /** @type {ReturnType<typeof listed>} */ (ones.flat()).flatMap(({ kind, at, piece }) => [
+      piece.file,
+      tables[kind][at].data.file,
+    ]),
+  );
 }
 
 /** Reads files of data, and reports the bytes that have arrived. */

@@ -1,10 +1,9 @@
 // The objects of WebGPU that a manifest describes, and their contents.
 
-import { BLOCKS, enlarged, inBlocks, levelsOf, readText } from "./loading.js";
+import { BLOCKS, enlarged, inBlocks, levelsOf, listed, readText } from "./loading.js";
 import { wholeWindow } from "./mirrors.js";
 
-/** @import { Data } from "./loading.js" */
-/** @typedef {Record<string, Record<string, any>>} Changes of contents, by kind and place */
+/** @import { Changes, Data } from "./loading.js" */
 
 export const CANVAS = "canvas";
 const HALVES = 8; // bytes of a texel of four half floats
@@ -66,10 +65,6 @@ export class Objects {
   async show(counts, changes, data, isWanted) {
     const load = () => this.load(counts, data);
     await (this.loaded = this.loaded.then(load, load));
-    const listed = (/** @type {Changes} */ ones) =>
-      Object.entries(ones).flatMap(([kind, places]) =>
-        Object.entries(places).map(([at, piece]) => ({ kind, at: Number(at), piece })),
-      );
     const back = listed(this.changed).map((one) => ({ ...one, piece: this.manifest.tables[one.kind][one.at].data })),
       differ = [...back, ...listed(changes)];
     const contents = await Promise.all(differ.map(({ piece }) => data.read(piece)));
