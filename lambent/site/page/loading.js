@@ -160,13 +160,9 @@ export const listed = (changes) =>
 
 /** Files whose content is needed again once it is on the GPU: what states change. @param {any} manifest @returns {Set<string>} */
 export function neededAgain({ tables, states }) {
-  const ones = states.map((/** @type {any} */ one) => listed(one.changes));
-  return new Set(
-    /** @type {ReturnType<typeof listed>} */ (ones.flat()).flatMap(({ kind, at, piece }) => [
-      piece.file,
-      tables[kind][at].data.file,
-    ]),
-  );
+  /** @type {ReturnType<typeof listed>} */
+  const ones = states.flatMap((/** @type {any} */ one) => listed(one.changes));
+  return new Set(ones.flatMap(({ kind, at, piece }) => [piece.file, tables[kind][at].data.file]));
 }
 
 /** Reads files of data, and reports the bytes that have arrived. */
