@@ -214,3 +214,21 @@ def _content(site, one):
         return unpacked(site, one["data"].get("blocks", one["data"]))
     levels = [(one["size"][0] >> k or 1) * (one["size"][1] >> k or 1) * 4 for k in range(one["mipLevelCount"])]
     return bytes(sum(levels))
+
+
+def test_damaged_files_are_named(javascript):
+    """A turned bit, an end cut off, something after the end, and the file of other data."""
+    whole = gzip.compress(bytes(range(256)) * 9, mtime=0)
+    turned = bytearray(whole)
+    turned[len(whole) // 2] ^= 4
+    files = [whole, bytes(turned), whole[:-9], whole + b"more", gzip.compress(b"other")]
+    code = """import {Data} from './loading.js';
+    const found = [];
+    for (const text of given) {
+      globalThis.fetch = async () => new Response(Buffer.from(text, 'base64'));
+      const read = new Data(() => {}).read({file: 'data/a.gz', bytes: 2304, packed: 1});
+      found.push(await read.then((one) => one.byteLength, (error) => error.message));
+    }
+    say(found);"""
+    found = javascript(code, [encoded(file) for file in files])
+    assert found == [2304, *["data/a.gz is damaged; export the site again"] * 4]
