@@ -124,8 +124,8 @@ def test_things_by_mouse_and_keys(chromium, site, hit):
         assert name == "floor"
         page.click("#name")
         page.mouse.dblclick(*FLOOR)
-        first_digits = math.trunc(100 * place[0]) / 100
-        page.wait_for_selector(f"body[data-camera^='{first_digits}']", state="attached")
+        x, z = (math.trunc(100 * place[axis]) / 100 for axis in (0, 2))
+        page.wait_for_selector(f"body[data-camera^='{x}'][data-camera*=',{z}']", state="attached")
         assert camera_of(page)[2] == pytest.approx(place[2], abs=0.01)
         assert faults == []
 
