@@ -232,3 +232,15 @@ def test_damaged_files_are_named(javascript):
     say(found);"""
     found = javascript(code, [encoded(file) for file in files])
     assert found == [2304, *["data/a.gz is damaged; export the site again"] * 4]
+
+
+def test_blocks_are_taken_where_all_states_have_them(javascript):
+    plain, blocks = {"file": "a"}, {"file": "b", "blocks": {"file": "c"}, "standin": {"file": "d"}}
+    textures = [{"format": "rgba16float", "data": one} for one in (plain, blocks, blocks)] + [{"format": "rgba16float"}]
+    changes = {"texture": {"1": {"file": "e", "blocks": {"file": "f"}}, "2": {"file": "g"}}}
+    manifest = {"tables": {"texture": textures}, "states": [{"changes": {}}, {"changes": changes}]}
+    code = "import {takeBlocks} from './loading.js'; takeBlocks(given); say(given);"
+    found = javascript(code, manifest)
+    taken = {"format": "bc6h-rgb-ufloat", "data": {"file": "c", "standin": {"file": "d"}}}
+    assert found["tables"]["texture"] == [textures[0], taken, *textures[2:]]
+    assert found["states"][1]["changes"]["texture"] == {"1": {"file": "f"}, "2": {"file": "g"}}

@@ -139,17 +139,19 @@ export function inBlocks(texels) {
   return found.buffer;
 }
 
-/** Take cube maps in blocks of BC6H, where the manifest has them. @param {any} manifest */
+/** Take cube maps in blocks of BC6H, where the manifest has them for all states. @param {any} manifest */
 export function takeBlocks({ tables, states }) {
-  /** @param {Piece} piece @returns {Piece} */
-  const taken = ({ blocks, standin, ...piece }) => ({ ...(blocks ?? piece), ...(standin ? { standin } : {}) });
-  for (const one of tables.texture) {
-    if (one.data?.blocks) one.format = BLOCKS;
-    if (one.data) one.data = taken(one.data);
-  }
-  for (const { changes } of states) {
-    for (const [at, piece] of Object.entries(changes.texture ?? {})) changes.texture[at] = taken(piece);
-  }
+  const taken = (/** @type {any} */ { blocks, standin }) => ({ ...blocks, ...(standin ? { standin } : {}) });
+  tables.texture.forEach((/** @type {any} */ one, /** @type {number} */ at) => {
+    /** @type {Record<string, Piece>[]} */
+    const changed = states.flatMap((/** @type {any} */ { changes }) =>
+      changes.texture?.[at] ? [changes.texture] : [],
+    );
+    if (![one.data, ...changed.map((places) => places[at])].every((piece) => piece?.blocks)) return;
+    one.format = BLOCKS;
+    one.data = taken(one.data);
+    for (const places of changed) places[at] = taken(places[at]);
+  });
 }
 
 /** What changes: kinds and places of objects, and pieces. @param {Changes} changes */
