@@ -144,17 +144,21 @@ def run(
                 one = folders[number % len(folders)]
                 random = np.random.default_rng([seed, number])
                 content = mutate(one.files[one.broken], others, random)
-                _try(bench, one, content, result, keep, number)
+                before = _memory()
+                attempt(bench, one, content, result, keep, str(number))
+                counted = result.counts[one.reader]
+                counted.peak_mb = max(counted.peak_mb, (_memory("VmHWM") - before) / 2**20)
                 if out is not None and (number % 1000 == 0 or number == first + count - 1):
                     out.write_text(json.dumps(asdict(result), indent=1))
     faulthandler.cancel_dump_traceback_later()
     return result
 
 
-def _try(bench: Bench, one: Sound, content: bytes, result: Result, keep: Path | None, number: int) -> None:
+def attempt(bench: Bench, one: Sound, content: bytes, result: Result, keep: Path | None, number: str) -> str:
+    """Use a broken file and count what happens: what was said of it, "" where it could be used."""
     counted = result.counts.setdefault(one.reader, Count())
     counted.tried += 1
-    before = _memory()
+    said = ""
     start = time.process_time()
     try:
         said = bench.use(one, content)
@@ -165,7 +169,7 @@ def _try(bench: Bench, one: Sound, content: bytes, result: Result, keep: Path | 
         counted.failed += 1
         frames = [f for f in traceback.extract_tb(error.__traceback__) if "lambent/" in f.filename]
         where = f"{Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else "here"
-        key = f"{one.reader}: {type(error).__name__} at {where}: {ascii(str(error))[:100]}"
+        key = said = f"{one.reader}: {type(error).__name__} at {where}: {ascii(str(error))[:100]}"
         if key not in result.failures:
             print(f"{number}: {key}", flush=True)  # noqa: T201
             if keep is not None:
@@ -173,7 +177,7 @@ def _try(bench: Bench, one: Sound, content: bytes, result: Result, keep: Path | 
                 (keep / f"{number}-{Path(one.broken).name}").write_bytes(content)
         result.failures[key] = result.failures.get(key, 0) + 1
     counted.slowest_s = max(counted.slowest_s, time.process_time() - start)
-    counted.peak_mb = max(counted.peak_mb, (_memory("VmHWM") - before) / 2**20)
+    return said
 
 
 def _memory(which: str = "VmRSS") -> int:

@@ -19,6 +19,7 @@ from lambent.core.geometry.directions import direction
 from lambent.core.light.colour import luminance
 from lambent.core.pictures import exr, rgbe
 from lambent.core.pictures.images import read_encoded, read_image
+from lambent.editing.session.document import document_from, load_document
 from lambent.materials.bsdf import MaterialBSDF
 from lambent.materials.document import Lobe, Material, Provenance, load_material
 from lambent.materials.measured import load
@@ -33,6 +34,7 @@ from lambent.scenes.scene import ImageEnvironment, MaterialTextures, Scene, Text
 from lambent.scenes.sky.environments import from_lat_long
 from lambent.scenes.validation import validate
 from lambent.store.contract import SceneRecord, baked_views, scene_record, write_scene_record
+from lambent.store.kept.session import read_session, write_session
 from lambent.store.kept.views import read_views, with_views
 from lambent.store.plans import plan_of
 from lambent.store.source import inputs_of
@@ -66,6 +68,7 @@ def sound() -> tuple[Sound, ...]:
     factors = _factors()
     found += [Sound("homomorphic factors", factors, "alpha", file, use_table) for file in factors]
     found += [_alone("material document", _material(), use_material), _alone("published fits", _fits(), use_fits)]
+    found += [_alone("session.json", _session(), use_session), _alone("session of edits", _edits(), use_edits)]
     found += [_alone(name, content, use_picture) for name, content in _pictures().items()]
     scenes = {
         "glTF 2.0": [("scene.gltf", scene_seeds.gltf("inside")), ("scene.gltf", scene_seeds.gltf("beside"))],
@@ -140,6 +143,30 @@ c = Aggregate({kd}, LowCookTorrance(albedo = [1, 1, 1], roughness = .2, eta = 1.
 """.encode()
 
 
+def _edits() -> bytes:
+    material = json.loads(_material())
+    camera = {"name": "a", "position": [0, 1, 0], "target": [0, 1, -1], "up": [0, 1, 0], "fov_y_deg": 45}
+    return json.dumps({
+        "format": "lambent-edit-session", "version": 2, "scene": "room.store", "camera": camera, "size": [64, 48],
+        "environment": {"file": "sky.hdr", "scale": 2, "rotation_deg": 30}, "merged": {"wall": "plaster"},
+        "materials": {"copper": {"start": material, "now": material | {"kd": 0.3}}}, "crease_deg": 40,
+    }).encode()  # fmt: skip
+
+
+def _session() -> bytes:
+    edits, material = json.loads(_edits()), json.loads(_material())
+    room = {
+        "materials": {"copper": material}, "textures": {"copper": "", "floor": "copper"},
+        "light": {"groups": {"sun": {"on": True, "intensity": 1.5, "temperature_k": 3000.0}}},
+        "lamps": {"0": {"position": [0, 2, 0], "aim": [0, -1, 0], "rotation_deg": 20}},
+    }  # fmt: skip
+    view = {"camera": edits["camera"], "speed_m_s": 1.5, "look": {"exposure_ev": 3, "lookups": {"ball": "auto"}}}
+    return json.dumps({
+        "format": "lambent-walk-session", "version": 2, "now": room, "beside": room, "states": {"evening": room},
+        "view": view, "edited": {"a": {"document": edits, "shown": ["copper"]}}, "sky": {"turn_deg": 90},
+    }).encode()  # fmt: skip
+
+
 def _pictures() -> dict[str, bytes]:
     image = np.random.default_rng(0).random((6, 9, 3)).astype(np.float32)
     with tempfile.TemporaryDirectory() as folder:
@@ -205,6 +232,27 @@ def _evaluate(material: Material) -> None:
 def use_fits(path: Path) -> None:
     for one in read_fits(path).values():
         assert np.isfinite(one.eval(WI, WO)).all(), "f is not finite"
+
+
+def use_session(path: Path) -> None:
+    session = read_session(path)
+    assert session is not None
+    for room in session.rooms:
+        assert np.isfinite(list(room.light.factors.values()) or 0).all(), "a mix is not finite"
+        for material in list(room.materials.values())[:MATERIALS_USED]:
+            _evaluate(material)
+    session.unknown({"copper"}, {"sun"})
+    for one in session.edited.values():
+        document_from(one.document, path)
+    write_session(path.with_name("saved"), session)
+    assert read_session(path.with_name("saved")) == session, "saved, it reads otherwise"
+
+
+def use_edits(path: Path) -> None:
+    document = load_document(path)
+    for one in list(document.materials.values())[:MATERIALS_USED]:
+        _evaluate(one.start)
+        _evaluate(one.now)
 
 
 def use_picture(path: Path) -> None:

@@ -26,8 +26,9 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.errors import UserError, did_you_mean
 from lambent.core.geometry.directions import angles, direction, reflect
-from lambent.materials.measured.columns import Layout, assemble, rows_of
+from lambent.materials.measured.columns import Layout, assemble
 from lambent.materials.measured.parts.text_numbers import head_text, read_text, shown, without_comments
+from lambent.materials.measured.parts.text_rows import rows_of
 from lambent.materials.measured.protocol import MeasuredTable, Quantity
 
 Pair = tuple[Floats, Floats]
@@ -293,4 +294,4 @@ def _rows(body: bytes, stated: int, confidence: str, path: Path) -> Floats:
     if found and found not in widths:
         expected = " or ".join(str(width) for width in sorted(widths)) + " by #DIM and #VS"
         raise UserError("wrong number of columns", file=path, got=found, expected=expected)
-    return rows_of(body, found or stated, path)
+    return rows_of(body, found or stated, path)[0]

@@ -34,14 +34,15 @@ from lambent.core.geometry.directions import Floats, direction
 from lambent.materials.measured.parts.gonio_rows import LONGEST_NAME, check_angles, quantity_of, table_of, to_f
 from lambent.materials.measured.parts.spectral import rgb_of_measured, rgb_of_xyz
 from lambent.materials.measured.parts.text_numbers import (
+    HINT_PERCENT,
     HINT_QUANTITY,
+    HINT_SPECTRAL,
     head_text,
-    numbers,
     read_text,
-    refuse_decimal_commas,
     shown,
     without_comments,
 )
+from lambent.materials.measured.parts.text_rows import rows_of
 from lambent.materials.measured.protocol import MeasuredTable, Quantity
 from lambent.materials.measured.tables.gonio import FORMAT
 from lambent.materials.measured.tables.scattered import ScatteredTable
@@ -50,12 +51,15 @@ from lambent.materials.measured.tables.table import isotropic_brdf, require_valu
 _OWN = re.compile(r"theta_i phi_i theta_o phi_o (?:(?:f|f_cos|p)|(f|f_cos|p)_r \1_g \1_b)")  # surely degrees on a grid
 _OUT = ("o", "out", "s", "r", "scat", "refl", "v", "view", "e")
 _IN = ("i", "in", "inc", "l", "light", "incident")
-_WAVELENGTH = re.compile(r"(\d+\.?\d*)_?nm$", re.IGNORECASE)
+_WAVELENGTH = re.compile(r"[(\[@]?(\d+\.?\d*)_?nm[)\]]?$", re.IGNORECASE)
+_ANGLES = re.compile(r"(theta|zenith|phi|azimuth|az|elevation|elev|el)_?([a-z]+)")
+_LIKE = {"zenith": "theta", "azimuth": "phi", "az": "phi"} | dict.fromkeys(("elevation", "elev", "el"), "theta")
 _SEPARATORS = re.compile(r"[\s,;]+")
-_BEFORE_UNIT = re.compile(r"\s+(?=[(\[])")  # "theta_i (deg)" is one name
-_COMMENT_KEY = re.compile(rb"^#[^\S\n]*(\w+):[^\S\n]*(\S[^\n]*?)\s*$", re.MULTILINE)
-_VARS = re.compile(rb"^[ \t]*VARS[ \t=:]+([^\n]*theta_?i[^\n]*theta_?s[^\n]*)\n?", re.MULTILINE | re.IGNORECASE)
-_KEYWORD = re.compile(rb"^[ \t]*([A-Z][A-Z0-9_ ]*?)[ \t]*[=:]?[ \t]+(\S[^\n]*?)[ \t]*$", re.MULTILINE)
+_BEFORE_UNIT = re.compile(r"(?<!\s)\s+(?=[(\[])")  # "theta_i (deg)" is one name
+_OTHER_COMMENTS = re.compile(rb"^[ \t]*(?:%|//)[^\n]*", re.MULTILINE)
+_COMMENT_KEY = re.compile(rb"^#[^\S\n]*(\w+):[^\S\n]*(\S[^\n]*)", re.MULTILINE)
+_VARS = re.compile(rb"^[ \t]*VARS[ \t=:]+([^\n]*)\n?", re.MULTILINE | re.IGNORECASE)
+_KEYWORD = re.compile(rb"^[ \t]*([A-Z][A-Z0-9_]*)(?:[ \t]*[=:])?[ \t]+(\S[^\n]*)", re.MULTILINE)
 _HEAD_BYTES = 1 << 16  # of a file, in which keys are sought
 _SCATTERED = 4  # fewer outgoing directions per incident one do not form a grid
 
@@ -83,6 +87,8 @@ class Layout:
         As the file names it.
     gridded : bool, optional
         Whether the incident directions form a grid; None if the rows decide.
+    raised : tuple of str
+        theta_i and theta_o, where a column has the elevation above the surface.
     """
 
     angles: dict[str, int]
@@ -94,6 +100,7 @@ class Layout:
     phi_i_deg: float = 0.0
     symmetry: str | None = None
     gridded: bool | None = None
+    raised: tuple[str, ...] = ()
 
     @classmethod
     def absolute(cls, quantity: Quantity, kind: str, values: int, wavelengths_nm: tuple[float, ...] = ()) -> Layout:
@@ -158,15 +165,18 @@ class ColumnText:
             A column is unknown, no name gives the quantity of the values, a row is broken, an angle is outside its
             range, or the incident directions neither form a grid nor are scattered.
         """
-        heading = self.heading(read_text(path, self.limit_bytes))
+        text = read_text(path, self.limit_bytes)
+        heading = self.heading(text)
         if heading is None:
             raise UserError("the columns have no names", file=path, hint=HINT_QUANTITY)
         layout = layout_of(heading.names, path)
         quantity = layout.quantity or self.quantity
         if quantity is None:
             got = ", ".join(heading.names[column] for column in layout.values)
-            raise UserError("quantity of the value columns is not stated", file=path, got=got, hint=HINT_QUANTITY)
-        rows = rows_of(heading.body, len(heading.names), path, wrapped=self.wrapped)
+            hint = HINT_SPECTRAL if layout.wavelengths_nm else HINT_QUANTITY
+            raise UserError("quantity of the value columns is not stated", file=path, got=got, hint=hint)
+        above = text.count(b"\n") - heading.body.count(b"\n")
+        rows, said = rows_of(heading.body, len(heading.names), path, above, wrapped=self.wrapped)
         stated = heading.keys.get(self.count_key)
         if stated is not None and stated.split()[0] != str(len(rows)):
             expected = f"{len(rows)}, the number of rows"
@@ -180,12 +190,12 @@ class ColumnText:
         symmetry, own = heading.keys.get("symmetry"), _OWN.fullmatch(" ".join(heading.names)) is not None
         gridded = False if self.scattered else own or None
         layout = replace(layout, quantity=quantity, radians=radians, phi_i_deg=self.phi_i_deg)
-        return assemble(rows, replace(layout, symmetry=symmetry, gridded=gridded), path, self.NAME, name, notes)
+        return assemble(rows, replace(layout, symmetry=symmetry, gridded=gridded), path, self.NAME, name, notes + said)
 
 
 def _of_gonio_text(text: bytes) -> Heading | None:
     """The last names before the rows, in a comment or not; None without any."""
-    keys = {key.decode(): shown(value) for key, value in _COMMENT_KEY.findall(text[:_HEAD_BYTES])}
+    keys = {key.decode(): shown(value.rstrip()) for key, value in _COMMENT_KEY.findall(text[:_HEAD_BYTES])}
     named: list[str] | None = None
     at = 0
     while at < len(text):
@@ -200,6 +210,7 @@ def _of_gonio_text(text: bytes) -> Heading | None:
                 named = words
             if not comment:
                 body = without_comments(text[end + 1 if named is words else at :])
+                body = _OTHER_COMMENTS.sub(b"", body) if b"%" in body or b"//" in body else body
                 return Heading(named, keys, body) if named else None
         at = end + 1
     return None
@@ -208,10 +219,12 @@ def _of_gonio_text(text: bytes) -> Heading | None:
 def _of_astm(text: bytes) -> Heading | None:
     """The names in a line VARS; None without one."""
     text = without_comments(text)
-    found = _VARS.search(text)
+    names = (b"theta_?i", b"theta_?s")
+    lines = _VARS.finditer(text)
+    found = next((line for line in lines if all(re.search(n, line[1], re.IGNORECASE) for n in names)), None)
     if found is None:
         return None
-    keys = {key.decode(): shown(value) for key, value in _KEYWORD.findall(text[: found.start()])}
+    keys = {key.decode(): shown(value.rstrip()) for key, value in _KEYWORD.findall(text[: found.start()])}
     return Heading([name for name in _SEPARATORS.split(shown(found[1])) if name], keys, text[found.end() :])
 
 
@@ -259,18 +272,23 @@ def layout_of(names: list[str], path: Path) -> Layout:
             raise UserError("a column is missing", file=path, field=needed, got=" ".join(names))
     radians = any("rad" in re.split(r"[^a-z]+", names[column].lower()) for column in angles.values())
     columns = tuple(column for column in range(len(names)) if column not in angles.values())
+    raised = tuple(name for name, column in angles.items() if names[column].lower().startswith("el"))
     words = [names[column].lower() for column in columns]
-    nm = [_WAVELENGTH.search(word) for word in words]
-    if len(words) > 1 and all(nm):
-        wavelengths = tuple(float(found[1]) for found in nm if found)
-        return Layout(angles, columns, quantity_of(_WAVELENGTH.sub("", words[0])), "spectra", wavelengths, radians)
+    if percent := [word for word in words if "%" in word or "percent" in word]:
+        raise UserError("values are in percent", file=path, field=percent[0], expected="1/sr", hint=HINT_PERCENT)
+    nm = [_WAVELENGTH.search(word) if len(word) <= LONGEST_NAME else None for word in words]
+    wavelengths = tuple(float(found[1]) for found in nm if found)
+    if words and all(nm):
+        kind = "spectra" if len(words) > 1 else "grey"
+        quantity = quantity_of(_WAVELENGTH.sub("", words[0]))
+        return Layout(angles, columns, quantity, kind, wavelengths, radians, raised=raised)
     if len(words) == 1:
-        return Layout(angles, columns, quantity_of(words[0]), "grey", (), radians)
+        return Layout(angles, columns, quantity_of(words[0]), "grey", (), radians, raised=raised)
     for kind in ("rgb", "xyz"):
         named = [re.fullmatch(rf"(?:(.*)_)?{channel}", word) for word, channel in zip(words, kind, strict=False)]
         stems = {found[1] or "" for found in named if found}
         if len(words) == 3 and all(named) and len(stems) == 1:
-            return Layout(angles, columns, quantity_of(stems.pop()), kind, (), radians)
+            return Layout(angles, columns, quantity_of(stems.pop()), kind, (), radians, raised=raised)
     expected = "one column, three (r g b or x y z), or one per wavelength (such as 550nm)"
     raise UserError("unknown value columns", file=path, got=" ".join(words) or "none", expected=expected)
 
@@ -282,30 +300,13 @@ def _angle(name: str) -> str | None:
     word = re.sub(r"\(.*?\)|\[.*?\]|_?(?:deg|rad)$", "", name.lower()).replace("-", "_").strip("_")
     if word in ("dphi", "delta_phi", "phi_diff", "deltaphi"):
         return "dphi"
-    found = re.fullmatch(r"(theta|phi)_?([a-z]+)", word)
+    if word == "aoi":
+        return "theta_i"
+    found = _ANGLES.fullmatch(word)
     if found is None:
         return None
     side = "i" if found[2] in _IN else "o" if found[2] in _OUT else None
-    return f"{found[1]}_{side}" if side else None
-
-
-def rows_of(body: bytes, columns: int, path: Path, *, wrapped: bool = False) -> Floats:
-    """(N, columns) numbers, separated by blanks, commas or semicolons; a row per line unless `wrapped`.
-
-    Raises
-    ------
-    UserError
-        If there are no rows, a row has another number of values, or numbers have decimal commas.
-    """
-    refuse_decimal_commas(body, path)
-    flat = numbers(re.sub(rb"[,;]", b" ", body), path)
-    lines = -(-len(flat) // columns) if wrapped else sum(1 for line in body.split(b"\n") if line.strip(b" \t,;"))
-    if lines == 0:
-        raise UserError("has no rows", file=path)
-    if len(flat) != lines * columns:
-        got = f"{len(flat)} numbers in {lines} rows"
-        raise UserError("a row does not have one value per column name", file=path, got=got, expected=columns)
-    return flat.reshape(-1, columns)
+    return f"{_LIKE.get(found[1], found[1])}_{side}" if side else None
 
 
 def assemble(
@@ -321,6 +322,10 @@ def assemble(
     f, said = _values(rows[:, list(layout.values)], layout)
     f = to_f(f, layout.quantity or "f", angles[:, 2])
     require_values(f, usable_values(f), path)
+    if layout.raised:
+        notes += ("elevations count from the surface: theta is 90 degrees less the elevation",)
+    if layout.kind == "grey" and layout.wavelengths_nm:
+        notes += (f"measured at {layout.wavelengths_nm[0]:g} nm alone: taken as grey",)
     if "phi_i" not in layout.angles:
         notes += (f"phi_i not stated, taken as {layout.phi_i_deg:g}",)
     gridded = layout.gridded
@@ -340,6 +345,7 @@ def _degrees(rows: Floats, layout: Layout) -> Floats:
     unit = 180 / np.pi if layout.radians else 1.0
     with np.errstate(over="ignore"):
         given = {name: rows[:, column] * unit for name, column in layout.angles.items()}
+    given |= {name: 90 - given[name] for name in layout.raised}
     theta_i, theta_o = given["theta_i"], given["theta_o"]
     phi_i = given.get("phi_i", np.full(len(rows), layout.phi_i_deg))
     phi_o = phi_i + given["dphi"] if "dphi" in given else given.get("phi_o", phi_i + 180)

@@ -18,14 +18,17 @@ from typing import Literal, Protocol
 from lambent.core.discovery import modules_in
 from lambent.core.errors import UserError
 from lambent.core.inputs import foreign_bytes, open_input
-from lambent.core.plain import is_number
+from lambent.core.plain import is_number, printable
 from lambent.materials.measured.parts.text_numbers import HINT_QUANTITY, UTF16, is_utf16, shown
 from lambent.materials.measured.protocol import MeasuredTable
 from lambent.materials.measured.tables.gonio import AUTO, GonioTable, Reconstruction
 
 _HEAD_BYTES = 4096
-_LEAST_NUMBERS = 5  # of a row of columns
+_LEAST_NUMBERS = 5  # of a row of columns without names
+_FEWEST_NUMBERS = 3  # of one below names: two angles and a value
+_SHOWN = 80  # characters of names
 _TEXT_EXPORT = "export it as Zemax BSDF, ASTM E1392 or plain columns with named angles"
+_SHEET_EXPORT = f"save its sheet of measurements as CSV or tab-separated text, and {HINT_QUANTITY}"
 _KINDS = (
     ("ALTA binary", rb"#FORMAT[ \t]+binary", "convert it to ALTA text: data2data without `format binary`"),
     ("SPEOS (OPTIS) BSDF", rb"OPTIS\s*-[^\n]*surface file", _TEXT_EXPORT),
@@ -35,6 +38,8 @@ _KINDS = (
     ("VIAVI, RPC Photonics or Light Tec text with columns of its own",
      rb"(?i:\bVIAVI\b|RPC[ _-]Photonics|Engineered Diffuser|Light[ -]?Tec\b)|\bED[CSLF]\d?-\d",
      "take the same specimen's Zemax BSDF file (.bsdf), or name the columns: theta_i phi_i theta_o phi_o f"),
+    ("Excel workbook (.xls)", rb"\A\xd0\xcf\x11\xe0", _SHEET_EXPORT),
+    ("Excel workbook (.xlsx)", rb"(?s)\APK\x03\x04.*?(?:\[Content_Types\]\.xml|xl/)", _SHEET_EXPORT),
     ("HDF5 or MATLAB 7.3", rb"\A\x89HDF\r\n", _TEXT_EXPORT),
     ("ZIP archive", rb"\APK\x03\x04", "unpack it, and load the file inside"),
     ("gzip archive", rb"\A\x1f\x8b", "unpack it, and load the file inside"),
@@ -48,8 +53,24 @@ def kind_of(head: bytes) -> tuple[str, str] | None:
     row = re.match(r"(?:\s*(?:[#%]|//)[^\n]*\n)*\s*([^\n]*)", shown(begin))
     words = re.split(r"[\s;]+|,\s+", row[1].strip()) if row else []
     if found is None and len(words) >= _LEAST_NUMBERS and all(is_number(word.replace(",", ".")) for word in words):
-        return "columns without names", f"{HINT_QUANTITY}, without decimal commas"
+        return "columns without names", HINT_QUANTITY
+    if found is None and row and (names := _names_above_numbers(row[1], shown(begin)[row.end() :])):
+        return f"columns with names that are not known ({names})", HINT_QUANTITY
     return found
+
+
+def _every_other_is_nul(head: bytes) -> bool:
+    """Whether a file begins as text of ASCII characters of two bytes, without a byte order mark."""
+    begin = head[: 2 * _SHOWN]
+    return len(begin) > 2 and any(not any(begin[k::2]) and all(begin[1 - k :: 2]) for k in (0, 1))
+
+
+def _names_above_numbers(line: str, below: str) -> str:
+    """A line of words, if a row of numbers follows it; otherwise nothing."""
+    row = re.match(r"\s*([^\n]*)\n", below)
+    words = re.split(r"[\s,;]+", row[1].strip(" \t,;\r")) if row else []
+    fits = len(words) >= _FEWEST_NUMBERS and all(is_number(word) for word in words)
+    return printable(line.strip()[:_SHOWN]) if fits else ""
 
 
 HEAD_BYTES = 1 << 16
@@ -100,7 +121,7 @@ def load(path: Path | str, reconstruction: Reconstruction | Literal["auto"] = AU
         if not isinstance(table, GonioTable):
             raise UserError(f"does not apply to {reader.NAME}", file=path, field="reconstruction")
         return dataclasses.replace(table, reconstruction=reconstruction)
-    if head.startswith(UTF16):
+    if head.startswith(UTF16) or _every_other_is_nul(head):
         raise is_utf16(path)
     if (kind := kind_of(head)) is not None:
         raise UserError(f"is {kind[0]}, which is not supported", file=path, hint=kind[1])
@@ -126,7 +147,7 @@ def _head(path: Path) -> tuple[bytes, int]:
     """The first bytes of a file and its size; raises `UserError` if it cannot be read."""
     with open_input(path) as file:
         head, size = file.read(HEAD_BYTES), os.fstat(file.fileno()).st_size
-    if not size:
+    if not head.strip() and size <= HEAD_BYTES:
         raise UserError("file is empty", file=path)
     return head, size
 

@@ -124,6 +124,18 @@ def check_cd(candela: Floats, file: Path) -> None:
         raise UserError("are out of range", file=file, field="intensities", got=got, expected=expected)
 
 
+def odd_values(horizontal_deg: Floats, candela: Floats) -> tuple[str, ...]:
+    """Lines on intensities (H, V) below zero, and on planes 0 and 360 that differ."""
+    said, below = [], candela < 0
+    if below.any():
+        share = f"{int(below.sum())} of {candela.size} intensities ({below.mean():.2g} of all)"
+        said.append(f"{share} are below zero, down to {float(candela.min()):.3g}; they count as 0")
+    first, last = (candela[np.isclose(horizontal_deg, at)] for at in (0, 360))
+    if len(first) and len(last) and (off := float(np.abs(first - last).max())) > 0:
+        said.append(f"planes 0 and 360 differ, by up to {off:.3g}; plane 0 is taken")
+    return tuple(said)
+
+
 def whole_turn(horizontal_deg: Floats, values: Floats, mirrors_deg: Iterable[float] = ()) -> tuple[Floats, Floats]:
     """Angles from 0 to 360 degrees, both included, and values (H, V) there.
 

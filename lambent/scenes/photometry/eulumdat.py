@@ -19,7 +19,14 @@ from lambent.core.arrays import Floats
 from lambent.core.ceilings import IES_ANGLES
 from lambent.core.errors import UserError
 from lambent.core.inputs import decoded
-from lambent.scenes.photometry.distribution import Photometry, check_angles, check_cd, numbers_of, whole_turn
+from lambent.scenes.photometry.distribution import (
+    Photometry,
+    check_angles,
+    check_cd,
+    numbers_of,
+    odd_values,
+    whole_turn,
+)
 from lambent.scenes.photometry.luminaire import LampSet, Luminaire
 from lambent.scenes.photometry.opening import POINT, Opening
 
@@ -75,7 +82,7 @@ class _Reading:
             self._path, "EULUMDAT", SYMMETRIES[symmetry], self._lines[8], self._lines[0], self._lines[7],
             tuple(map(self._lamps, sets)), replace(whole, opening=self._opening()), True,
             self._number(HEADER_LINES + 1, "number of lamps", -1e6, 1e6) < 0, ratio, downward,
-            self._number(25, "tilt", -360, 360),
+            self._number(25, "tilt", -360, 360), odd_values(c_deg, candela),
         )  # fmt: skip
 
     def _angles_and_values(self, start: int, planes: int, angles: int) -> tuple[Floats, Floats, Floats]:

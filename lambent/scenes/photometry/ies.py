@@ -34,7 +34,15 @@ from lambent.core.errors import UserError
 from lambent.core.geometry.directions import angles, direction
 from lambent.core.inputs import decoded
 from lambent.scenes.loaders.scene_files import SceneFiles
-from lambent.scenes.photometry.distribution import MOST_CD, Photometry, check_angles, check_cd, numbers_of, whole_turn
+from lambent.scenes.photometry.distribution import (
+    MOST_CD,
+    Photometry,
+    check_angles,
+    check_cd,
+    numbers_of,
+    odd_values,
+    whole_turn,
+)
 from lambent.scenes.photometry.luminaire import LampSet, Luminaire
 from lambent.scenes.photometry.opening import Opening, opening_of_signs
 
@@ -57,6 +65,7 @@ FINENESS = (1, 2, 4, 8, 16)
 PLANES = 72  # of type C at fineness 1
 MOST_NODES = 1 << 20
 TOLERANCE = 0.005  # of the largest intensity, at the file's own angles, and of the flux
+_DECIMAL_COMMA = re.compile(r"(?<![^\s])\d+,\d+(?![^\s])")  # commas may part numbers, too
 HALF_TURN = 180.0  # so that angles of planes, from -90 to 90 degrees, are positive
 
 
@@ -80,7 +89,8 @@ class _Reading:
         start = next(i for i, line in enumerate(lines) if _TILT.match(line))
         self._keywords: dict[str, str] = dict(_KEYWORD.findall("\n".join(lines[:start])))
         self._tilt = lines[start].partition("=")[2].strip()
-        self._numbers = self._numbers_of("\n".join(lines[start + 1 :]))
+        self._body = "\n".join(lines[start + 1 :])
+        self._numbers = self._numbers_of(self._body)
 
     def luminaire(self, files: SceneFiles) -> Luminaire:
         tilt_deg, tilt_factors = self._tilts(files)
@@ -97,6 +107,7 @@ class _Reading:
         vertical, horizontal = (np.array(self._take(n, name)) for n, name in ((verticals, UP), (horizontals, AROUND)))
         values = scale * np.reshape(self._take(verticals * horizontals, "candela"), (horizontals, verticals))
         check_cd(values, self._path)
+        notes = odd_values(horizontal, values) + self._left_over()
         made, symmetry = self._whole_sphere(kind, vertical, horizontal, np.maximum(values, 0))
         name = self._version if self._version in (*FULL, "IESNA91") else "IES LM-63"
         known, count = self._keywords.get, int(np.clip(lamps, 0, MOST_CD))
@@ -105,6 +116,7 @@ class _Reading:
             self._path, f"{name}, type {kind}", symmetry, known("LUMINAIRE") or known("LUMCAT", ""),
             known("MANUFAC", ""), known("TEST", ""), (lamp,),
             replace(made, opening=opening, tilt_deg=tilt_deg, tilt_factors=tilt_factors), False, lumens < 0,
+            notes=notes,
         )  # fmt: skip
 
     def _whole_sphere(self, kind: str, vertical: Floats, horizontal: Floats, values: Floats) -> tuple[Photometry, str]:
@@ -166,6 +178,15 @@ class _Reading:
         if len(taken) < count:
             raise self._error("file is truncated", field=field, got=len(taken), expected=f"{count} numbers")
         return taken
+
+    def _left_over(self) -> tuple[str, ...]:
+        """A line on numbers that follow the last one promised; `UserError` if these come of decimal commas."""
+        if not (count := len(self._numbers)):
+            return ()
+        if found := _DECIMAL_COMMA.search(self._body):
+            hint = "replace the decimal commas by points"
+            raise self._error("has more numbers than it promises", field="candela", got=found[0], hint=hint)
+        return (f"{count} numbers follow the last that the file promises; they are ignored",)
 
     def _numbers_of(self, text: str) -> Sequence[float]:
         return list(numbers_of(text.replace(",", " ").split(), self._path))

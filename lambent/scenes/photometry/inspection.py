@@ -81,6 +81,9 @@ def plot_polar(path: Path, luminaire: Luminaire) -> None:
 
 
 def _findings(luminaire: Luminaire, light: Photometry) -> Iterator[str]:
+    yield from luminaire.notes
+    if not light.lumens:
+        yield "gives no light"
     lamps, ratio, share = luminaire.sets[0].lumens, luminaire.ratio, _downward(light)
     if luminaire.per_klm and not lamps:
         yield "the file states no flux of the lamps: values are those of 1000 lm"

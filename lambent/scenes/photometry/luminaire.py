@@ -41,6 +41,8 @@ class Luminaire:
         Light output ratio, and share of the flux below the horizontal, as stated: 0 to 1.
     measured_tilt_deg : float
         Tilt of the luminaire while it was measured. Intensities are those of the tilted luminaire.
+    notes : tuple of str
+        What of the file was not taken as it is.
     """
 
     file: Path
@@ -56,6 +58,7 @@ class Luminaire:
     ratio: float | None = None
     downward: float | None = None
     measured_tilt_deg: float = 0.0
+    notes: tuple[str, ...] = ()
 
     def photometry(self, lamp_set: int = 0) -> Photometry:
         """Intensities in candela with the lamp set of that index; `UserError` if there is none, or none with a flux."""

@@ -110,6 +110,7 @@ _CHANNELS = {1: ("",), 3: (" (red)", " (green)", " (blue)")}
 NON_RECIPROCAL = 5.0  # percentages of the mean from which a difference is reported
 ASYMMETRIC = 5.0
 EXTRAPOLATED = 0.5  # percentage of the pairs of directions above which it is reported
+BLACKEST, BRIGHTEST = 1e-4, 2.0  # albedos: a third of the darkest coating's, 3.6e-4; beyond any error of calibration
 UNDER_SAMPLED = 0.5  # share of the peak that its neighbours must reach
 SATURATED = 2.0  # tuples at the maximum, by tuples in the tenth below it, above which the maximum is a device's limit
 _LEAST_SATURATED, _STANDS_OUT = 10, 2.0  # tuples at the maximum; its ratio to the median, which an even table lacks
@@ -211,8 +212,9 @@ def under_sampled(samples: MeasuredSamples) -> tuple[int, list[str]]:
         return 0, []
     _, row, highest, beside, step_deg = min(peaks, key=lambda peak: peak[0])
     theta, phi = np.degrees(angles(samples.wi[row]))
+    many = f"{len(peaks)} incident direction{'s' * (len(peaks) > 1)}"
     return len(peaks), [
-        f"the peak is under-sampled at {len(peaks)} incident directions: at theta_i = {theta:.3g}, phi_i = {phi:.3g} "
+        f"the peak is under-sampled at {many}: at theta_i = {theta:.3g}, phi_i = {phi:.3g} "
         f"degrees f falls from {highest:.3g} to {beside:.3g} /sr within one step of {step_deg:.2g} degrees"
     ]
 
@@ -223,6 +225,8 @@ def saturated(samples: MeasuredSamples) -> tuple[float, list[str]]:
     A peak falls off smoothly, so more tuples lie in the tenth below its maximum than exactly at it. Tables of a few
     discrete values have none there.
     """
+    _, first = np.unique(np.round(np.hstack([samples.wi, samples.wo]), 6), axis=0, return_index=True)
+    samples = samples.take(np.sort(first))  # a grid repeats theta_o = 0 at every phi_o
     share, said = 0.0, []
     for channel, name in zip(range(samples.f.shape[1]), _CHANNELS[samples.f.shape[1]], strict=True):
         f = samples.f[:, channel]
@@ -259,6 +263,15 @@ def too_bright(theta_i_deg: Floats, albedo: Floats) -> list[str]:
         f"returns {albedo[row, channel]:.3g} of the light{name} at theta_i = {theta_i_deg[row]:g} degrees, "
         f"more than arrives; over 1 at {at} degrees"
     ]
+
+
+def in_another_unit(albedo: Floats, peaks_missed: float) -> list[str]:
+    """A line if no material scatters so much or so little; a peak that the grid misses can return any share."""
+    most = float(albedo.max())
+    if most >= BLACKEST and (most <= BRIGHTEST or peaks_missed):
+        return []
+    return [f"scatters at most {most:.3g} of the light, as no material does: are the values in 1/sr, not in percent or "
+            "relative to something?"]  # fmt: skip
 
 
 def _difference(one: Floats, other: Floats) -> float:
@@ -337,6 +350,7 @@ def inspect_table(table: MeasuredTable) -> dict[str, Any]:
             *unusable,
             *negative(samples),
             *too_bright(np.array(_THETA_I_DEG), r + t),
+            *in_another_unit(r + t, judged["under_sampled"][0]),
             *(line for _, lines in judged.values() for line in lines),
             *one_incident_angle(samples),
         ],

@@ -129,6 +129,9 @@ _LEAST_FILLED = 0.3  # share of nodes that a grid of outgoing directions must fi
 _PLANE_DEG = 0.1  # a scan this close to the plane of incidence counts as in it
 
 
+_HINT_RAISED = "angles that count from the surface are named elevation_i and elevation_o"
+
+
 def check_angles(angles_deg: Floats, path: Path) -> None:
     """Raise `UserError` if an angle (N, 4) is not finite or out of range."""
     expected = "degrees: theta_i in [0, 90), theta_o in [0, 180], phi up to 3600"
@@ -139,7 +142,8 @@ def check_angles(angles_deg: Floats, path: Path) -> None:
         row = int(np.argmin(inside))
         got = ", ".join(f"{angle:g}" for angle in angles_deg[row])
         field = f"measurement {row + 1}"
-        raise UserError("an angle is outside its range", file=path, field=field, got=got, expected=expected)
+        hint = _HINT_RAISED if theta_i.max(initial=0) == 90 else None
+        raise UserError("an angle is outside its range", file=path, field=field, got=got, expected=expected, hint=hint)
 
 
 def quantity_of(word: str) -> Quantity | None:

@@ -17,8 +17,10 @@ from lambent.core.inputs import read_bytes
 UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _BINARY = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 _DECIMAL_COMMA = re.compile(rb"(?:^|[\s;])[-+]?\d+,\d+(?:[eE][-+]?\d+)?(?=[\s;]|$)")
-_COMMENT = re.compile(rb"#[^\n]*")
+_COMMENT = re.compile(rb"(?<![^\s,;])#[^\n]*")  # not the `#` of Windows' 1.#QNAN
 HINT_QUANTITY = "name the columns in the first line: theta_i phi_i theta_o phi_o, then f, f_cos or p"
+HINT_SPECTRAL = "put the quantity before each wavelength: f_550nm, f_cos_550nm or p_550nm"
+HINT_PERCENT = "f is R / (100 pi) of a reflectance factor R in percent"
 HINT_DECIMAL_COMMA = "replace the decimal commas by points, and separate the columns by blanks or semicolons"
 
 
