@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import faulthandler
+import importlib
 import importlib.util
 import json
 import os
@@ -52,8 +53,7 @@ def instrumented() -> Any:
     """While this lasts, what is imported of the readers tells atheris its branches."""
     if not guided():
         return nullcontext()
-    import atheris
-
+    atheris: Any = importlib.import_module("atheris")  # no dependency: it is for some systems alone
     compiled = [file for file in (ROOT / "lambent").rglob("*.py") if "numba" in file.read_text()]
     exclude = [".".join(file.relative_to(ROOT).with_suffix("").parts) for file in compiled]  # numba knows no counters
     return atheris.instrument_imports(include=list(INSTRUMENTED), exclude=exclude)
@@ -94,10 +94,11 @@ def fuzz_one(number: int, seconds: float, corpus: Path, folder: Path, report: Pa
 
 def by_branches(use: Use, kept: Path, others: list[bytes], whole: bytes) -> None:
     """libFuzzer over `lambent`'s branches."""
-    import atheris
     import numpy as np
 
     from tests.reliability.mutations import mutate
+
+    atheris: Any = importlib.import_module("atheris")
 
     def broken(content: bytes, most: int, seed: int) -> bytes:
         random = np.random.default_rng(seed)
