@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from lambent.core.plain import printable
+
 LONGEST = 600  # characters of a message or a path
 
 
@@ -47,7 +49,7 @@ class UserError(Exception):
             parts.append(f"; expected {_short(expected, 4 * LONGEST)}")
         if hint is not None:
             parts.append(f"; {hint}")
-        super().__init__(" ".join("".join(parts).splitlines()))
+        super().__init__(printable(" ".join("".join(parts).splitlines())))
 
     def _render_traceback_(self) -> list[str]:
         """In a notebook, the line alone: IPython asks for this."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import platform
 import sys
 import threading
 from pathlib import Path
@@ -12,6 +13,7 @@ from weakref import WeakValueDictionary
 from lambent.core.errors import UserError
 
 FILE = ".writer.lock"  # the file stays in the folder; its existence means nothing
+LONGEST = 300  # bytes of a process's number and its machine's name
 
 
 def lock(handle: int, *, wait: bool) -> bool:
@@ -61,14 +63,16 @@ class WriterLock:
         ours = lock(self._handle, wait=False)
         os.lseek(self._handle, 0, os.SEEK_SET)
         if not ours:
-            who = f"process {os.read(self._handle, 20).decode('ascii', 'replace').strip()}"
+            number, _, machine = os.read(self._handle, LONGEST).decode("utf-8", "replace").strip().partition(" ")
+            elsewhere = machine and machine != platform.node()  # on a network drive
+            who = f"process {number} on {machine}" if elsewhere else f"process {number}"
             self.release()
             hint = "wait until it ends, or stop it"
             raise UserError(
                 "is locked by another writer", file=folder, got=who, expected="one writer at a time", hint=hint
             )
         os.ftruncate(self._handle, 0)
-        os.write(self._handle, f"{self._process}\n".encode("ascii"))
+        os.write(self._handle, f"{self._process} {platform.node()}\n".encode())
         _held[path] = self
 
     @property

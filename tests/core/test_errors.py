@@ -54,3 +54,10 @@ def test_a_value_of_another_type_is_said_in_the_words_of_files(kind: type, value
     with pytest.raises(ValidationError) as raised:
         TypeAdapter(kind).validate_python(value)
     assert words in str(invalid(raised.value, "scene.toml"))
+
+
+def test_names_from_files_cannot_steer_a_terminal_or_hide() -> None:
+    """Where the line is shown by Python or a notebook, too."""
+    name = "oak\x1b]0;title\x07\r\n\u202egnp.\u200b\x9b2J"
+    for said in (str(UserError(name, file=name, field=name, got=name, expected=name, hint=name)),):
+        assert said.isprintable() and said.count("\\x1b]0;title\\x07") == 6 and "\\u202e" in said

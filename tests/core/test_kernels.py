@@ -63,7 +63,8 @@ with kernels._turn:
 
 
 def run(program: str, layer: str) -> subprocess.CompletedProcess[str]:
-    settings = os.environ | {"NUMBA_THREADING_LAYER": layer}
+    settings = os.environ | {"NUMBA_THREADING_LAYER": layer, "NUMBA_BOUNDSCHECK": "0"}
+    settings.pop("NUMBA_CACHE_DIR", None)  # of loops with checks, if these tests run with them
     return subprocess.run([sys.executable, "-c", program], env=settings, capture_output=True, text=True)
 
 

@@ -68,7 +68,16 @@ def test_nothing_else_is_served(ask, path):
 def test_only_this_machines_names_and_only_reading(ask):
     assert ask("/", Host="rooms.example:80")[0] == 403
     assert ask("/", Host="localhost:1")[0] == 200
-    assert ask("/", "POST")[0] == 501
+    for method in ("POST", "PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "CONNECT"):
+        assert ask("/", method)[0] == 501, method
+    for host in ("rooms.example", "localhost.example", "127.0.0.1.example:80", ""):
+        assert ask("/", Host=host)[0] == 403, host
+
+
+def test_no_other_site_may_read(ask):
+    for path in ("/", "/data/a.gz", "/nothing"):
+        headers = ask(path, Origin="https://rooms.example")[1]
+        assert not [name for name in headers if name.lower().startswith("access-control-")]
 
 
 def test_what_cannot_be_served_is_said(tmp_path, site):

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import gc
 import os
+import platform
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from threading import Event, Thread
@@ -13,6 +15,7 @@ from threading import Event, Thread
 import numpy as np
 import pytest
 
+from lambent.core import files
 from lambent.core.errors import UserError
 from lambent.store.contract import SceneRecord, write_scene_record
 from lambent.store.kept.views import change_views, read_views
@@ -82,10 +85,50 @@ def test_a_second_process_is_told_who_writes_and_damages_nothing(tmp_path: Path)
     assert store.documents == {"timings": {"a": 1}} and store.availability("theirs") == ("partial", 0.25)
 
 
-def test_the_file_of_the_lock_holds_the_writers_number_alone(tmp_path: Path) -> None:
+def test_the_file_of_the_lock_holds_the_writer_alone(tmp_path: Path) -> None:
     (tmp_path / FILE).write_text("1234567890, left by a process that died\n")
     lock = WriterLock(tmp_path)
-    assert (tmp_path / FILE).read_text() == f"{os.getpid()}\n" and lock.held
+    assert (tmp_path / FILE).read_text() == f"{os.getpid()} {platform.node()}\n" and lock.held
+
+
+def test_a_writer_on_another_machine_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    here = platform.node()
+    monkeypatch.setattr(platform, "node", lambda: "attic")
+    lock = WriterLock(tmp_path)
+    monkeypatch.setattr(platform, "node", lambda: here)
+    found: list[str] = []
+
+    def attempt() -> None:
+        with pytest.raises(UserError) as caught:
+            WriterLock(tmp_path)
+        found.append(str(caught.value))
+
+    thread = Thread(target=attempt)
+    thread.start()
+    thread.join()
+    assert f"found process {os.getpid()} on attic; " in found[0]
+    lock.release()
+    WriterLock(tmp_path).release()
+
+
+def test_clocks_that_jump_lock_nothing_and_lose_nothing(tmp_path: Path) -> None:
+    """Files of a dead writer and of another machine, from a year ahead and from 1970."""
+    with Store.create(tmp_path / "s", {}) as store:
+        store.put("a", "x", ONE, key="k")
+    dead = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, text=True)
+    left = tmp_path / "s" / f"{files._MACHINE}{dead.stdout.strip()}-00000000-0"
+    elsewhere = left.with_name(left.name.replace(files._MACHINE, ".lambent-00000000-"))
+    for now_s in (time.time() + 3e7, 0.0):
+        left.write_text("")
+        elsewhere.write_text("")
+        for path in (tmp_path / "s").rglob("*"):
+            os.utime(path, (now_s, now_s))
+        with Store.create(tmp_path / "s", {}) as store:
+            assert store.read("a").tolist() == [1, 1, 1]
+            store.put("a", "x", 2 * ONE, key="l")
+            store.put("a", "x", ONE, key="k")
+        assert not left.exists() and elsewhere.exists(), "another machine's file may be in use"
+    assert Store.open(tmp_path / "s").read("a").tolist() == [1, 1, 1]
 
 
 def test_the_right_to_write_ends_with_close_with_the_object_and_with_a_context(tmp_path: Path) -> None:

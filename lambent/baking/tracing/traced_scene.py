@@ -288,7 +288,8 @@ class TracedScene:
         first = np.argmax(same & asked[:, None], axis=2)  # repeated points are tested once
         once = asked & (first == np.arange(POINTS))
         found = np.zeros(asked.shape, bool)
-        found[once] = test(t.positions[once], sign * t.flat[once])
+        if once.any():  # a scene may have nothing on this side; Dr.Jit has no empty arrays
+            found[once] = test(t.positions[once], sign * t.flat[once])
         return np.asarray(np.take_along_axis(found, first, axis=1) & asked)
 
 

@@ -19,7 +19,7 @@ from lambent.materials.document import Material
 from lambent.scenes.geometry import patch
 from lambent.scenes.loaders.meshes.flush import with_flush_raised
 from lambent.scenes.scene import ImageEnvironment, Scene, SceneObject
-from tests.baking.small_scenes import TINY, constant_picture
+from tests.baking.small_scenes import TINY, constant_picture, room_with_step
 
 OVER = 0.5  # metres that walls go on above the ceiling, and ceiling and floor beyond the walls
 GREY = Material(kd=0.5)
@@ -125,3 +125,10 @@ def test_hidden_points_and_texels_by_hand() -> None:
     assert parted.tolist() == [[3, 3, 3, 3 + BEYOND, 3 + BEYOND, 4 + BEYOND]]
     everything, same = without_hidden(texels, np.ones((6, POINTS), bool), ~np.zeros((6, POINTS), bool), labels)
     assert everything.all() and (same == labels).all()
+
+
+def test_a_side_on_which_nothing_is_lit_needs_no_rays(tmp_path: Path) -> None:
+    """A camera in a room of closed bodies asks for the light of backs, of which there is none."""
+    eye = Camera("eye", (0.6, 0.3, 0.8), (-0.8, -0.2, -0.4))
+    store = bake(replace(room_with_step(), cameras=(eye,)), tmp_path / "s", quality=TINY, only=("light_map",))
+    assert store.read("light_map/irradiance").mean() > 0
