@@ -28,8 +28,8 @@ FLAGS = (
     "--no-sandbox", "--enable-unsafe-webgpu", "--enable-features=Vulkan", "--use-vulkan=swiftshader",
     "--use-angle=swiftshader",
 )  # fmt: skip
-SIZE, FILM = (1120, 630), (480, 270)
-STEPS, MS = 40, 120
+SIZE, FILM = (1120, 630), (400, 225)
+STEPS, MS = 24, 200
 THING = 0.714, 0.74  # of the picture: what is clicked, the teapot
 
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import errno
+import gzip
+import io
+import re
 from functools import partial
 from http import HTTPStatus
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
@@ -10,12 +13,14 @@ from pathlib import Path
 from typing import Any
 
 from lambent.core.errors import UserError
+from lambent.core.inputs import read_bytes
 
 TYPES = {
     ".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=utf-8", ".css": "text/css; charset=utf-8",
     ".json": "application/json", ".wgsl": "text/plain; charset=utf-8", ".gz": "application/gzip", ".jpg": "image/jpeg",
     ".webp": "image/webp", ".avif": "image/avif",
 }  # fmt: skip
+TEXTS, TEXT_BYTES = re.compile(r"text/|application/json"), 1 << 28  # what is compressed on the way
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 FOREVER = "public, max-age=31536000, immutable"  # names of data and shaders are hashes of their content
 
@@ -58,7 +63,19 @@ class _Handler(SimpleHTTPRequestHandler):
         if path is None or path.suffix not in TYPES:
             self.send_error(HTTPStatus.NOT_FOUND)
             return None
+        if TEXTS.match(TYPES[path.suffix]) and "gzip" in self.headers.get("Accept-Encoding", ""):
+            return self._packed(path)
         return super().send_head()
+
+    def _packed(self, path: Path) -> io.BytesIO:
+        """The file compressed: shaders and manifest are a megabyte of text."""
+        packed = gzip.compress(read_bytes(path, TEXT_BYTES), mtime=0)
+        self.send_response(HTTPStatus.OK)
+        headers = {"Content-Type": TYPES[path.suffix], "Content-Encoding": "gzip", "Content-Length": str(len(packed))}
+        for name, value in headers.items():
+            self.send_header(name, value)
+        self.end_headers()
+        return io.BytesIO(packed)
 
     def _asked(self) -> Path | None:
         """The file that is asked for, if it is in the folder."""

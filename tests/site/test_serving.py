@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import http.client
 import os
 import threading
@@ -54,6 +55,17 @@ def test_files_have_their_types(ask):
     assert status == 200 and headers["Content-Type"].startswith("text/javascript")
     status, headers, _ = ask("/data/a.gz", "HEAD")
     assert status == 200 and headers["Content-Type"] == "application/gzip" and "immutable" in headers["Cache-Control"]
+
+
+def test_texts_are_compressed_for_browsers_that_unpack_them(ask, site):
+    (site / "manifest.json").write_text('{"ä": 1}' * 1000, "utf-8")
+    status, headers, body = ask("/manifest.json", **{"Accept-Encoding": "gzip, br"})
+    assert status == 200 and headers["Content-Encoding"] == "gzip" and int(headers["Content-Length"]) == len(body) < 200
+    assert gzip.decompress(body) == (site / "manifest.json").read_bytes()
+    assert ask("/manifest.json")[2] == (site / "manifest.json").read_bytes()
+    status, headers, body = ask("/data/a.gz", **{"Accept-Encoding": "gzip"})
+    assert status == 200 and "Content-Encoding" not in headers, "the page unpacks these itself"
+    assert ask("/link.json", **{"Accept-Encoding": "gzip"})[0] == 404
 
 
 @pytest.mark.parametrize(
