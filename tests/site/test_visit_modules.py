@@ -83,28 +83,6 @@ def test_picks_are_those_of_the_window(javascript, box):
     assert len(names) >= 5 and None in names, "the rays meet several things, and nothing"
 
 
-def test_a_pick_among_many_triangles_is_quick(javascript):
-    """143,000 of them, in one thing whose box is always hit."""
-    code = """import {Geometry} from './picking.js';
-    const side = 268, vertices = [], indices = [];
-    for (let i = 0; i <= side; i++) for (let j = 0; j <= side; j++) vertices.push(i, Math.sin(i * j), j);
-    for (let i = 0; i < side; i++) for (let j = 0; j < side; j++) {
-      const k = i * (side + 1) + j; indices.push(k, k + 1, k + side + 1, k + 1, k + side + 2, k + side + 1);
-    }
-    const thing = {name: 'g', material: 'm', first: 0, count: indices.length / 3,
-      bounds: [[0, -1, 0], [side, 1, side]]};
-    const geometry = new Geometry(Float32Array.from(vertices), 3, Uint32Array.from(indices), [thing]);
-    const times = [];
-    for (let k = 0; k < 9; k++) {
-      const begun = performance.now();
-      geometry.hit([130.2, 50, 130.3 + k], [0, -1, 0]); geometry.floorBelow([130.2, 50, 130.3 + k], 1.6);
-      times.push(performance.now() - begun);
-    }
-    say([thing.count, times.sort((a, b) => a - b)[4], geometry.hit([130.2, 50, 130.3], [0, -1, 0]).thing.name]);"""
-    count, ms, name = javascript(code)
-    assert count > 143_000 and name == "g" and ms < 30
-
-
 def test_floors_and_walls_are_those_of_the_window(javascript, box):
     low, high = map(np.array, box.bounds)
     rng = np.random.default_rng(3)
