@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 RECORDS = sorted({*(ROOT / "docs/decisions").glob("*.md")} - {ROOT / "docs/decisions/README.md"})
-WORDS, RECORD_WORDS, MOST_RECORDS = 35_000, 150, 40  # of all pages together, of a decision's record, and their number
+WORDS, RECORD_WORDS, MOST_RECORDS = 31_500, 150, 40  # of all pages together, of a decision's record, and their number
 COMMAND = re.compile(r"(?:^ *|`|lambent )lambent ([a-z]+)([^`\n]*)", re.MULTILINE)
 
 
@@ -53,7 +53,8 @@ def test_anchors_are_headings(page):
 
 
 def words(page: Path) -> int:
-    return len(page.read_text("utf-8").split())
+    """Markup of tables is none."""
+    return sum(any(one.isalnum() for one in word) for word in page.read_text("utf-8").split())
 
 
 def test_the_docs_stay_short():
