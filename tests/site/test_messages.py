@@ -6,6 +6,7 @@ import shutil
 
 import pytest
 
+from lambent.site.export import POSTER
 from tests.site.conftest import served
 from tests.site.other_browsers import firefox, webkit
 
@@ -54,4 +55,4 @@ def test_where_scripts_do_not_run(chromium, box_site, tmp_path):
 def test_other_browsers_without_webgpu(browser, box_site, tmp_path):
     with browser(tmp_path) as ask, served(box_site) as address:
         message, width_px, is_visible = ask(address, "WebGPU")
-    assert NAMED in message and width_px == 1280 and is_visible
+    assert NAMED in message and width_px == POSTER[0] and is_visible
