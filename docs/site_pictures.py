@@ -24,16 +24,15 @@ from lambent.store.contract import scene_record
 from lambent.store.store import Store
 
 PICTURES = Path(__file__).parent / "pictures"
-FLAGS = (
-    "--no-sandbox", "--enable-unsafe-webgpu", "--enable-features=Vulkan", "--use-vulkan=swiftshader",
-    "--use-angle=swiftshader",
-)  # fmt: skip
+sys.path.insert(0, str(PICTURES.parents[1]))  # for the browser's flags, which the tests have
 SIZE, FILM = (1120, 630), (400, 225)
 STEPS, MS = 24, 200
 THING = 0.714, 0.74  # of the picture: what is clicked, the teapot
 
 
 def main(site: Path, store: Path) -> None:
+    from tests.site.conftest import FLAGS
+
     program = shutil.which("chromium") or shutil.which("google-chrome")
     with SiteServer(site) as server, sync_playwright() as driver:
         threading.Thread(target=server.serve_forever, daemon=True).start()

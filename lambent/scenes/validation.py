@@ -13,10 +13,8 @@ from lambent.scenes.scene import Mesh, Scene
 
 LARGE, SMALL = 500.0, 0.05  # metres
 ALL_LIGHT = 1.001  # diffuse reflectance; fits and conversions round
-THING_M, THINGS = (
-    20.0,
-    3,
-)  # half of the objects of rooms in metres are smaller than 2 m, of rooms in centimetres than 200
+# Half of the objects of rooms in metres are smaller than 2 m, of rooms in centimetres than 200.
+THING_M, THINGS = 20.0, 3
 
 
 def validate(scene: Scene) -> list[str]:

@@ -174,10 +174,11 @@ class Manifest:
 
     def _with_standin(self, texture: Any) -> dict[str, Any]:
         """Where the content of a texture is, and what stands in for it until it has arrived, if it is large."""
-        content = self._content(texture)
+        levels = texture_levels(self._device, texture)
+        content = self._texels(texture, levels)
         if content.get("blocks", content)["packed"] < LARGE:
             return content
-        found = standin(texture.format, texture.size, texture_levels(self._device, texture))
+        found = standin(texture.format, texture.size, levels)
         if found is None:
             return content
         finest, levels = found
@@ -188,7 +189,7 @@ class Manifest:
         """Where the present content of a buffer or texture is."""
         made = self._device.made[id(one)]
         if made.kind == "texture":
-            return self._texels(one)
+            return self._texels(one, texture_levels(self._device, one))
         data, usage = buffer_bytes(self._device, one), made.descriptor["usage"]
         if (
             usage & VERTEX
@@ -200,8 +201,7 @@ class Manifest:
         packing = Packing(4, channels, [(len(data) // 4, 0)]) if len(data) % (4 * channels) == 0 else None
         return self.chunks.add(data, packing)
 
-    def _texels(self, texture: Any) -> dict[str, Any]:
-        levels = texture_levels(self._device, texture)
+    def _texels(self, texture: Any, levels: list[bytes]) -> dict[str, Any]:
         if texture.format in BLOCKS:
             return self.chunks.add(b"".join(levels))
         if texture.format == COLOURS and (picture := _picture(texture, levels)):
