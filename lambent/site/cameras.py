@@ -9,11 +9,10 @@ import numpy as np
 
 from lambent.realtime.frame_state import FrameState, frame_data, near_of
 from lambent.realtime.gpu.commands import Commands
-from lambent.realtime.gpu.structs import FRAME_DTYPE, MIRRORED_VIEW_DTYPE, PLAN_DTYPE
+from lambent.realtime.gpu.structs import FRAME_DTYPE, MIRRORED_VIEW_DTYPE, PLAN_DTYPE, offsets_of
 from lambent.realtime.passes.cover import PLACES
 from lambent.realtime.planar.planar_view import MOST_REFLECTORS
 from lambent.realtime.renderer import Renderer
-from lambent.site.chunks import Packing
 from lambent.site.manifest import Manifest, camel
 from lambent.store.contract import ReflectorRecord
 
@@ -50,33 +49,25 @@ def cameras_of(renderer: Renderer, manifest: Manifest, state: FrameState) -> dic
     return {
         "frame": {
             "buffer": manifest.written(renderer.frame_buffer), "bytes": list(frame_data(state, bounds).tobytes()),
-            "nearM": near_of(bounds), "offsets": _offsets(FRAME_DTYPE),
+            "nearM": near_of(bounds), "offsets": offsets_of(FRAME_DTYPE),
             "weight": manifest.written(renderer.accumulate.weight),
             "places": [
                 {"buffer": manifest.written(buffer), "jitter": list(at)}
                 for buffer, at in zip(renderer.cover.uniforms, PLACES, strict=True)
             ],
         },
-        "clusters": {"places": _chunk(manifest, places), "sizes": _chunk(manifest, sizes)},
+        "clusters": {"places": manifest.chunks.add_table(places), "sizes": manifest.chunks.add_table(sizes)},
         "mirrors": {
-            "most": MOST_REFLECTORS, "offsets": _offsets(MIRRORED_VIEW_DTYPE), "planOffsets": _offsets(PLAN_DTYPE),
+            "most": MOST_REFLECTORS, "offsets": offsets_of(MIRRORED_VIEW_DTYPE), "planOffsets": offsets_of(PLAN_DTYPE),
             "bytes": MIRRORED_VIEW_DTYPE.itemsize, "planBytes": PLAN_DTYPE.itemsize,
             "buffers": [_buffers(manifest, renderer.planar.uniforms(k)) for k in range(len(reflectors))],
             "reflectors": [reflector_for_page(one) for one in reflectors],
             "corners": [
-                _chunk(manifest, renderer.reflector_faces.corners(k).reshape(-1, 3).astype(np.float32))
+                manifest.chunks.add_table(renderer.reflector_faces.corners(k).reshape(-1, 3).astype(np.float32))
                 for k in range(len(reflectors))
             ],
         },
     }  # fmt: skip
-
-
-def _chunk(manifest: Manifest, table: Any) -> dict[str, Any]:
-    return manifest.chunks.add(table.tobytes(), Packing(4, table.shape[1], [(table.size, 0)]))
-
-
-def _offsets(dtype: Any) -> dict[str, int]:
-    return {name: field[1] for name, field in dtype.fields.items()}
 
 
 def _buffers(manifest: Manifest, uniforms: tuple[Any, Any, Any]) -> dict[str, int]:

@@ -93,6 +93,10 @@ class Chunks:
         self.files[name] = size = len(content)
         return {"file": name, "bytes": size, "packed": size, "picture": True}
 
+    def add_table(self, table: NDArray[Any]) -> dict[str, Any]:
+        """Where a table (rows, columns) of words of 4 bytes is."""
+        return self.add(table.tobytes(), Packing(4, table.shape[1], [(table.size, 0)]))
+
     def add(self, data: bytes, packing: Packing | None = None) -> dict[str, Any]:
         """Where `data` is: a file relative to the site, named by its SHA-256, bytes unpacked and packed, packing."""
         digest = hashlib.sha256(data).hexdigest()

@@ -195,8 +195,7 @@ class Manifest:
             usage & VERTEX
             and (words := words_of(np.frombuffer(data, np.float32).reshape(-1, VERTEX_FLOATS))) is not None
         ):
-            shorter = Packing(4, words.shape[1], [(words.size, 0)])
-            return {**self.chunks.add(words.tobytes(), shorter), "units": UNITS}
+            return {**self.chunks.add_table(words), "units": UNITS}
         channels = VERTEX_FLOATS if usage & VERTEX else 3 if usage & INDEX else 1
         packing = Packing(4, channels, [(len(data) // 4, 0)]) if len(data) % (4 * channels) == 0 else None
         return self.chunks.add(data, packing)

@@ -7,7 +7,7 @@ anew in every mix.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -18,7 +18,7 @@ from lambent.baked.probes.irradiance import irradiance_of
 from lambent.core.arrays import Floats
 from lambent.core.light.light_mix import LEAST_K, MOST_K, GroupMix, LightMix, black_body
 from lambent.realtime.gpu.cube_mips import finite, mip_chain, smooth_chain
-from lambent.realtime.gpu.structs import LAMP_DTYPE, OBJECT_DTYPE, SUN_DTYPE
+from lambent.realtime.gpu.structs import LAMP_DTYPE, OBJECT_DTYPE, SUN_DTYPE, offsets_of
 from lambent.realtime.gpu.uploads import half
 from lambent.realtime.integrators.integrators import Cube
 from lambent.realtime.light.group_arrays import GroupArrays
@@ -27,7 +27,7 @@ from lambent.realtime.light.probe_lamps import HEAD_ROWS, LAMP_ROWS
 from lambent.realtime.renderer import Renderer
 from lambent.realtime.resources import ObjectResources
 from lambent.scenes.light_groups import SKY
-from lambent.site.manifest import Manifest
+from lambent.site.manifest import FACES, Manifest
 
 RGB, BYTES = 3, 4  # of a float32
 SLIDER_K, COLOURS = (1800.0, 12000.0), 129  # range of the page's sliders, as in the window; colours of black bodies
@@ -135,7 +135,8 @@ class Mixing:
         for texture, one in textures.values():
             by_group = self._of_probe(one)
             if by_group is not None:
-                yield from self._texture(texture, [_chain(cube, one) if cube.any() else None for cube in by_group])
+                chain = _chain_of(one)
+                yield from self._texture(texture, [chain(cube) if cube.any() else None for cube in by_group])
 
     def _of_probe(self, one: Used) -> Floats | None:
         """Radiance (n, 6, N, N, 3) by group of the probe that an object shows; None if the store has none by group."""
@@ -154,18 +155,18 @@ class Mixing:
         baked, resources, unit = self._renderer.mixer.baked, self._resources, self._scene.unit
         if self._scene.sun is not None:
             sun = _diagonal([baked.sun(one) for one in self._units])
-            yield resources.sun.uniform, _offset(SUN_DTYPE, "irradiance"), sun
+            yield resources.sun.uniform, offsets_of(SUN_DTYPE)["irradiance"], sun
         for place, lamp in enumerate(resources.lamps.records):
-            offset = place * LAMP_DTYPE.itemsize + _offset(LAMP_DTYPE, "intensity")
+            offset = place * LAMP_DTYPE.itemsize + offsets_of(LAMP_DTYPE)["intensity"]
             yield resources.lamps.bindings[0], offset, _diagonal(self._units[:, lamp.group] * lamp.intensity)
         for one in used:
             uniform, record = self._manifest.resource(one.group, 0), one.item.record
             if not any(baked.emission(record, 0 * self._units[0])):  # else no group has it
                 emission = np.array([baked.emission(record, each) for each in self._units])
-                yield uniform, _offset(OBJECT_DTYPE, "emission"), _diagonal(emission / unit)
+                yield uniform, offsets_of(OBJECT_DTYPE)["emission"], _diagonal(emission / unit)
             if self._groups.number(SKY) is not None:
                 change = _diagonal([baked.sky_change(each) for each in self._units])
-                yield uniform, _offset(OBJECT_DTYPE, "sky_change"), change
+                yield uniform, offsets_of(OBJECT_DTYPE)["sky_change"], change
             yield from self._numbers_of_probe(one, uniform)
 
     def _numbers_of_probe(self, one: Used, uniform: Any) -> Iterator[tuple[Any, int, Floats]]:
@@ -175,7 +176,7 @@ class Mixing:
             return
         if light.probe.irradiance:
             parts = np.array([[irradiance_of(cube * channel) for channel in np.eye(RGB)] for cube in by_group])
-            yield uniform, _offset(OBJECT_DTYPE, "irradiance"), parts / light.probe.gain
+            yield uniform, offsets_of(OBJECT_DTYPE)["irradiance"], parts / light.probe.gain
         if one.cube != "cleaned":
             return
         rest, flat = light.lamps.radiance.reshape(-1, RGB), by_group.reshape(len(by_group), -1, RGB)
@@ -228,24 +229,24 @@ def _said(mix: GroupMix) -> dict[str, Any]:
     return {"intensity": mix.intensity if mix.on else 0.0, "kelvin": mix.temperature_k, "colour": list(mix.colour)}
 
 
-def _offset(record: np.dtype[Any], name: str) -> int:
-    fields: Mapping[str, Any] = record.fields or {}
-    return int(fields[name][1])
-
-
 def _diagonal(rgb: Any) -> Floats:
     """(n, 3, 3) parts of colours (n, 3): each channel is of its own factor."""
     return np.asarray(rgb)[:, :, None] * np.eye(RGB)
 
 
-def _chain(cube: Floats, one: Used) -> Levels:
-    """Levels of a cube map (6, N, N, 3) of one group's light in a probe, in the form that an object reads."""
+def _chain_of(one: Used) -> Callable[[Floats], Levels]:
+    """Makes levels of a cube map (6, N, N, 3) of one group's light in a probe, in the form that an object reads."""
     if one.cube != "cleaned":
-        return smooth_chain(cube) if one.cube == "smooth" else mip_chain(cube)
-    lamps = one.item.light.lamps
-    left = lamps.chain()[0].reshape(-1, *cube.shape)  # with 0, 1, ... groups of lamps taken out
-    chains = [smooth_chain(cube * _ratio(one, left[0], 1.0)) for one in left]
-    return [np.concatenate(levels) for levels in zip(*chains, strict=True)]
+        return smooth_chain if one.cube == "smooth" else mip_chain
+    whole, *_ = one.item.light.lamps.chain()
+    left = whole.reshape(-1, FACES, *whole.shape[1:])  # with 0, 1, ... groups of lamps taken out
+    shares = [_ratio(cube, left[0], 1.0) for cube in left]
+
+    def chain(cube: Floats) -> Levels:
+        chains = [smooth_chain(cube * share) for share in shares]
+        return [np.concatenate(levels) for levels in zip(*chains, strict=True)]
+
+    return chain
 
 
 def _ratio(part: Floats, whole: Floats, otherwise: float) -> Floats:

@@ -12,7 +12,6 @@ from lambent.realtime.frame_state import FALSE_COLOUR, VIEW_TRANSFORMS
 from lambent.realtime.gpu.pipelines import VERTEX_FLOATS
 from lambent.realtime.resources import SceneResources
 from lambent.scenes.scene import ImageTexture, Look, Variant
-from lambent.site.chunks import Packing
 from lambent.site.manifest import Manifest
 from lambent.site.walks import walk_of
 from lambent.store.contract import SceneRecord, whole_objects
@@ -61,9 +60,7 @@ def things(
 
 
 def _walk(path: CameraPath, manifest: Manifest) -> dict[str, Any]:
-    cameras = walk_of(path)
-    packing = Packing(4, cameras.shape[1], [(cameras.size, 0)])
-    return {"name": path.name, "seconds": path.seconds, "cameras": manifest.chunks.add(cameras.tobytes(), packing)}
+    return {"name": path.name, "seconds": path.seconds, "cameras": manifest.chunks.add_table(walk_of(path))}
 
 
 def facts_of(look: Look, textured: str) -> Facts:

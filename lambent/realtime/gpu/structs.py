@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,13 @@ from lambent.materials.shader_layout import wgsl_dtype
 from lambent.realtime.gpu.shader_source import assemble
 
 Record = NDArray[np.void]
+
+
+def offsets_of(record: np.dtype[Any]) -> dict[str, int]:
+    """Bytes before each field of a record."""
+    return {name: int(field[1]) for name, field in (record.fields or {}).items()}
+
+
 _DECLARED = {
     "LambentLobe": "lobes", "PlacedLobe": "surface", "Frame": "frame", "Material": "material", "Object": "surface",
     "Sun": "sun_record", "MirroredView": "planar_view", "Plan": "planar_walls", "Prefilter": "prefilter",

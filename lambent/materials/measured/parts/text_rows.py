@@ -7,7 +7,6 @@ where every row then has one number per column.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 from lambent.core.errors import UserError
@@ -95,15 +94,15 @@ def _numbers_by_line(text: bytes, path: Path, above: int) -> Floats:
         return numbers(text, path)
     except UserError as error:
         for k, line in enumerate(text.split(b"\n")):
-            if not _are_numbers(line, numbers, path):
+            if not _are_numbers(line, path):
                 raise UserError(error.message, file=path, field=f"line {above + k + 1}", got=error.got,
                                 hint=error.hint) from error  # fmt: skip
         raise
 
 
-def _are_numbers(line: bytes, read: Callable[[bytes, Path], Floats], path: Path) -> bool:
+def _are_numbers(line: bytes, path: Path) -> bool:
     try:
-        read(line, path)
+        numbers(line, path)
     except UserError:
         return False
     return True
