@@ -152,9 +152,9 @@ def fuzz(reader: str, minutes: float, corpus: Path) -> tuple[Any, dict[str, floa
     """The counts and failures of the readers whose name holds `reader`, and the minutes of each."""
     with instrumented():
         from tests.reliability.mutate import IN_MEMORY, Count, Result
-        from tests.reliability.readers import sound
+        from tests.reliability.readers import numbers_of, sound
 
-        chosen = [k for k, one in enumerate(sound()) if reader.lower() in one.reader.lower()]
+        chosen = numbers_of(reader, sound())
     result, spent = Result(), dict[str, float]()
     for k in chosen:
         one = sound()[k]

@@ -29,7 +29,7 @@ import numpy as np
 from lambent.core.errors import UserError
 from lambent.core.inputs import UNREADABLE
 from tests.reliability.mutations import mutate
-from tests.reliability.readers import Sound, sound
+from tests.reliability.readers import Sound, numbers_of, sound
 
 LONGEST_S = 10.0
 MOST_BYTES = 2 << 30
@@ -129,7 +129,7 @@ def run(
     folder: Path, first: int, count: int, seed: int, reader: str = "", out: Path | None = None, keep: Path | None = None
 ) -> Result:
     """Mutations `first` to `first + count` of a seed, over the readers whose name holds `reader`."""
-    folders = [one for one in sound() if reader.lower() in one.reader.lower()]
+    folders = [sound()[k] for k in numbers_of(reader, sound())]
     bench, result = Bench(folder), Result()
     others = [one.files[one.broken] for one in sound()]
     with warnings.catch_warnings():

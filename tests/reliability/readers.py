@@ -6,7 +6,7 @@ import io
 import json
 import tempfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -58,6 +58,14 @@ class Sound:
     main: str
     broken: str
     use: Callable[[Path], None]
+
+
+def numbers_of(reader: str, among: Sequence[Sound]) -> list[int]:
+    """Places of the readers whose name holds `reader`; ends the program if there are none."""
+    found = [k for k, one in enumerate(among) if reader.lower() in one.reader.lower()]
+    if not found:
+        raise SystemExit(f"no reader is named {reader!r}: {', '.join(dict.fromkeys(one.reader for one in among))}")
+    return found
 
 
 @cache
