@@ -105,7 +105,7 @@ WRONG = {
     "glare folder": "folder: not a store",
     "inspect absent.bsdf": "absent.bsdf: cannot be read (",
     "inspect folder": "folder: not a store",
-    "inspect infinite.txt": "known format",
+    "inspect infinite.txt": "columns with names that are not known (inf 400 500 600)",
     "inspect lamp.gldf": "ask its maker for an .ies or .ldt file",
     "relight folder": "folder: not a store",
     "relight folder --exposure 1": "--exposure: is for a picture; name it with -o",
