@@ -47,8 +47,7 @@ class Manifest:
         """
         self._in_blocks = in_blocks
         self._device, self._folder, self._size, self._shown = device, folder, size, shown
-        wide, _ = whole_window(size)
-        self._mirrored = int(wide[0]), int(wide[1])
+        self._mirrored = whole_window(size)
         self.chunks = Chunks(folder)
         self.tables: dict[str, list[Any]] = defaultdict(list)
         self._places: dict[int, int] = {}

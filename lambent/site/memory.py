@@ -57,7 +57,7 @@ def script_bytes(document: Mapping[str, Any], faces: int) -> int:
 def _texture_bytes(one: Mapping[str, Any]) -> int:
     form = BC6H if "blocks" in one.get("data", {}) else one["format"]
     block, side = BLOCKS.get(form) or (math.prod(texel(form)), 1)
-    following = {CANVAS: CANVAS_PX, MIRROR: [int(px) for px in whole_window(CANVAS_PX)[0]]}
+    following = {CANVAS: CANVAS_PX, MIRROR: whole_window(CANVAS_PX)}
     sides = following.get(one["size"][0]) or one["size"][:2]
     layers = one["size"][2] if len(one["size"]) > 2 else 1
     levels = [[-(-max(1, n >> level) // side) for n in sides] for level in range(one.get("mipLevelCount") or 1)]

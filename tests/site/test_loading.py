@@ -179,8 +179,8 @@ def test_memory_is_that_of_the_objects(streamed_site):
     tables = manifest["tables"]
     sizes = [len(_content(streamed_site, one)) for one in tables["texture"] if "data" in one]
     drawn = [one for one in tables["texture"] if "data" not in one]
-    (wide, high), _ = whole_window((1920, 1080))
-    texels = {"canvas": 1920 * 1080, "mirror": int(wide) * int(high)}
+    wide, high = whole_window((1920, 1080))
+    texels = {"canvas": 1920 * 1080, "mirror": wide * high}
     bytes_of = {
         "depth32float": 4,
         "rgb10a2unorm": 4,
@@ -192,7 +192,7 @@ def test_memory_is_that_of_the_objects(streamed_site):
     }
     wanted = sum(sizes) + sum(one["size"] for one in tables["buffer"])
     for one in drawn:
-        levels = [texels[one["size"][0]]] if one["mipLevelCount"] == 1 else _level_texels(int(wide), int(high), one)
+        levels = [texels[one["size"][0]]] if one["mipLevelCount"] == 1 else _level_texels(wide, high, one)
         wanted += bytes_of[one["format"]] * sum(levels)
     assert graphics_bytes(tables) == wanted
     (blue,) = manifest["states"][1:]

@@ -72,6 +72,8 @@ def planar_views(
     views = []
     for number, (_, reflector, plane) in enumerate(seen[:most]):
         shown = on_screen(frame, np.asarray(reflector.outline, float))
+        if not len(shown):  # its faces may lie beside its plane, within its tolerance
+            continue
         m = max((widest or {}).get(part.object, 0.0) for part in reflector.parts)
         place = _window(frame, (width, height), m, shown, step_px(height))
         view = view_through(frame, plane, reflector, (width, height), place, number)
@@ -83,22 +85,21 @@ def planar_views(
 def views_of_any_camera(
     frame: Record, reflectors: Sequence[ReflectorRecord], size: tuple[int, int]
 ) -> list[PlanarView]:
-    """Views of all reflectors, with windows of the whole frame; their records wait for a camera (`lambent.site`)."""
-    wide, _ = whole_window(size)
+    """Views of all reflectors, with buffers for any window; their records wait for a camera (`lambent.site`)."""
     return [
         PlanarView(
-            reflector, frame.copy(), np.zeros((), MIRRORED_VIEW_DTYPE), (int(wide[0]), int(wide[1])),
+            reflector, frame.copy(), np.zeros((), MIRRORED_VIEW_DTYPE), whole_window(size),
             None if reflector.plan is None else np.zeros((), PLAN_DTYPE),
         )
         for reflector in reflectors
     ]  # fmt: skip
 
 
-def whole_window(size: tuple[int, int]) -> tuple[Floats, Floats]:
-    """Size of a buffer that shows all of a frame of `size` with MOST_LEVELS MIP levels, and the frame's first pixel."""
+def whole_window(size: tuple[int, int]) -> tuple[int, int]:
+    """Size of a buffer that holds any window of a frame of `size`, with MOST_LEVELS MIP levels."""
     margin = max(MARGIN_PX, int(MOST_MARGIN * max(size)))
-    wide = np.array([max(-(-(length + 2 * margin) // STEP_PX) * STEP_PX, LEAST_WHOLE_PX) for length in size])
-    return wide, (wide - np.array(size)) // 2
+    width, height = (max(-(-(length + 2 * margin) // STEP_PX) * STEP_PX, LEAST_WHOLE_PX) for length in size)
+    return width, height
 
 
 def clearance_m(reflector: ReflectorRecord, eye: Floats) -> float:

@@ -203,7 +203,7 @@ export class Frame {
       ...(depth ? { depthStencilAttachment: attached(depth) } : {}),
     });
     if (view && one.camera === this.manifest.mirrors.buffers[view.number].frame) {
-      pass.setScissorRect(view.rectangle[0], view.rectangle[1], view.rectangle[2], view.rectangle[3]);
+      pass.setViewport(0, 0, view.view.size[0], view.view.size[1], 0, 1);
     }
     /** @type {Map<string, () => void>} what is set before the next draw: most of it is for objects out of view */
     const set = new Map();

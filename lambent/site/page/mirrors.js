@@ -1,16 +1,17 @@
 // Mirrored views of planar reflectors: lambent/realtime/planar/{planar_view,reflector_faces}.py in JavaScript. A view's
-// buffer shows the whole frame; what of it a camera needs is a rectangle, not a smaller buffer.
+// window is the first corner of a buffer that would hold the whole frame.
 
 import { along, clamp, dot } from "./vectors.js";
 
 /** @import { Vector } from "./vectors.js" */
 /** @typedef {ReturnType<typeof import("./camera.js").frameOf>} FrameFields */
 /** @typedef {{plane: number[], outline: Vector[], twoSided: boolean, deviationM: number, plan: any}} Reflector */
-/** @typedef {{number: number, upright: boolean, frame: any, view: any, plan: any, clip: number[][], rectangle: number[]}} View */
+/** @typedef {{number: number, upright: boolean, frame: any, view: any, plan: any, clip: number[][]}} View */
 
 const MARGIN_PX = 16,
   MOST_MARGIN = 0.1,
   STEP_PX = 64,
+  STEP_ROWS = [512, 256], // of frames, below which the step is halved
   MOST_LEVELS = 7,
   LEAST_PX = 2 << MOST_LEVELS;
 const CLEARANCE = 1e-5,
@@ -20,11 +21,32 @@ const CLEARANCE = 1e-5,
 /** How far a corner is within the frame's planes, by which polygons are cut one by one. @param {number[]} corner (x, y, w) */
 const withinSides = ([x, y, w]) => [w - LEAST_W, w + x, w - x, w + y, w - y];
 
-/** Size of a buffer for a frame, and the frame's first pixel in it. @param {number[]} size */
+/** Size of a buffer that holds any window of a frame. @param {number[]} size */
 export function wholeWindow(size) {
   const margin = Math.max(MARGIN_PX, Math.floor(MOST_MARGIN * Math.max(...size)));
-  const wide = size.map((length) => Math.max(Math.ceil((length + 2 * margin) / STEP_PX) * STEP_PX, LEAST_PX));
-  return { wide, offset: wide.map((length, i) => Math.floor((length - size[i]) / 2)) };
+  return size.map((length) => Math.max(Math.ceil((length + 2 * margin) / STEP_PX) * STEP_PX, LEAST_PX));
+}
+
+/** Size of a view's window, and the frame's first pixel in it: a pair for each side. @param {Reflector} one @param {number} m of its widest lobe @param {FrameFields} frame @param {number[]} size */
+function windowOf(one, m, frame, size) {
+  const shown = onScreen(one.outline.map((p) => [0, 1, 3].map((row) => dot(frame.rows[row], p) + frame.rows[row][3]))),
+    step = STEP_PX >> STEP_ROWS.filter((rows) => size[1] < rows).length,
+    reach = Math.max(MARGIN_PX, Math.floor((m * size[1]) / Math.hypot(...frame.up))),
+    margin = Math.min(reach, Math.max(MARGIN_PX, Math.floor(MOST_MARGIN * Math.max(...size))));
+  return size.map((length, i) => {
+    const most = Math.ceil((length + 2 * margin) / step) * step,
+      offset = Math.floor((most - length) / 2),
+      at = shown.map((place) => ((1 + (i ? -place[1] : place[0])) / 2) * length + offset),
+      low = clamp(Math.floor((Math.min(...at) - reach) / step) * step, 0, most),
+      high = clamp(Math.ceil((Math.max(...at) + reach) / step) * step, 0, most);
+    return [high - low, offset - low];
+  });
+}
+
+/** MIP levels without remainder. @param {number[]} size */
+function levelsOf([width, height]) {
+  const sides = width | height;
+  return Math.min(MOST_LEVELS, Math.floor(Math.log2(Math.min(width, height))) - 1, 32 - Math.clz32(sides & -sides));
 }
 
 /** The part of a polygon in a frame. @param {number[][]} polygon (x, y, w) */
@@ -46,11 +68,8 @@ function onScreen(polygon) {
 
 /** Share of the frame. @param {number[][]} polygon */
 function area(polygon) {
-  let sum = 0;
-  polygon.forEach(([x, y], i) => {
-    const [nextX, nextY] = polygon[(i + 1) % polygon.length];
-    sum += x * nextY - y * nextX;
-  });
+  const next = polygon.map((_, i) => polygon[(i + 1) % polygon.length]),
+    sum = polygon.reduce((before, [x, y], i) => before + x * next[i][1] - y * next[i][0], 0);
   return Math.abs(sum) / 8; // half, of the 2 x 2 square
 }
 
@@ -103,16 +122,17 @@ export function mirroredViews(reflectors, corners, widest, frame, size, most) {
   });
   seen.sort((a, b) => b.share - a.share);
   return seen.slice(0, most).flatMap(({ number, one, plane, m }, order) => {
-    const view = viewOf(one, plane, frame, size, order);
-    return view ? [{ ...view, number, rectangle: rectangleOf(one, m, frame, size) }] : [];
+    const view = viewOf(one, m, plane, frame, size, order);
+    return view ? [{ ...view, number }] : [];
   });
 }
 
-/** @param {Reflector} one @param {number[]} plane towards the viewer @param {FrameFields} frame @param {number[]} size @param {number} order */
-export function viewOf(one, plane, frame, size, order) {
+/** @param {Reflector} one @param {number} m of its widest lobe @param {number[]} plane towards the viewer @param {FrameFields} frame @param {number[]} size @param {number} order */
+function viewOf(one, m, plane, frame, size, order) {
   const n = /** @type {Vector} */ (plane.slice(0, 3)),
     d = plane[3],
-    { wide, offset } = wholeWindow(size);
+    sides = windowOf(one, m, frame, size),
+    [wide, offset] = [0, 1].map((which) => sides.map((side) => side[which]));
   const turned = (/** @type {Vector} */ v) => along(v, n, -2 * dot(n, v));
   const scale = [0, 1].map((i) => size[i] / wide[i]),
     shift = [0, 1].map((i) => (size[i] + 2 * offset[i] - wide[i]) / wide[i]);
@@ -124,7 +144,7 @@ export function viewOf(one, plane, frame, size, order) {
     up = /** @type {Vector} */ (turned(frame.up).map((value) => value / scale[1]));
   const forward = along(along(turned(frame.forward), across, -shift[0]), up, shift[1]);
   const steepest = dot(forward, n) + Math.abs(dot(across, n)) + Math.abs(dot(up, n));
-  if (steepest <= 0) return null;
+  if (steepest <= 0 || wide[0] < 0) return null; // nothing of its outline is in the frame
   const clearance = clearanceM(one, frame.eye),
     near = [...n, d - one.deviationM - clearance];
   clip[2] = clip[3].map((value, i) => value - (0.999 / steepest) * near[i]);
@@ -150,7 +170,7 @@ export function viewOf(one, plane, frame, size, order) {
       offset,
       tolerance: [one.deviationM + 2 * clearance],
       focal_px: [wide[1] / 2 / Math.hypot(...up)],
-      levels: [MOST_LEVELS],
+      levels: [levelsOf(wide)],
       number: [order],
     },
     plan: upright && one.plan ? planOf(one.plan, plane, eye) : null,
@@ -170,20 +190,4 @@ function planOf(plan, plane, eye) {
     to_v: row(plan.along, plan.rows),
     below: [-(dot(plane, eye) + plane[3])],
   };
-}
-
-/** What of a view's buffer its reflector needs: x, y, width, height. @param {Reflector} one @param {number} m of its widest lobe @param {FrameFields} frame @param {number[]} size */
-function rectangleOf(one, m, frame, size) {
-  const { wide, offset } = wholeWindow(size),
-    reach = Math.max(MARGIN_PX, Math.floor((m * size[1]) / Math.hypot(...frame.up)));
-  const shown = onScreen(one.outline.map((p) => [0, 1, 3].map((row) => dot(frame.rows[row], p) + frame.rows[row][3])));
-  const places = shown.map(([x, y]) => [((x + 1) / 2) * size[0] + offset[0], ((1 - y) / 2) * size[1] + offset[1]]);
-  if (!places.length) return [0, 0, ...wide];
-  const [[x, right], [y, below]] = [0, 1].map((i) => {
-    const at = places.map((place) => place[i]);
-    const first = Math.floor(Math.min(...at) - reach),
-      last = Math.ceil(Math.max(...at) + reach);
-    return [clamp(first, 0, wide[i]), clamp(last, 0, wide[i])];
-  });
-  return [x, y, right - x, below - y];
 }

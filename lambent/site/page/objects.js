@@ -207,7 +207,7 @@ export class Objects {
   fit(width, height) {
     const { made, device } = this,
       isOther = width !== this.width || height !== this.height,
-      { wide } = wholeWindow([width, height]);
+      wide = wholeWindow([width, height]);
     const counted = (/** @type {string} */ kind) =>
       /** @type {any[]} */ (this.manifest.tables[kind]).slice(0, this.counts[kind]);
     [this.width, this.height] = [width, height];

@@ -119,7 +119,7 @@ fn find_hit(place: Place, w: vec3f) -> Hit {
 
 fn buffer_sample(texel: vec2f, level: f32) -> vec3f {
     let wanted = clamp(level, 0.0, mirrored.levels - 1.0);
-    let uv = clamp(texel, vec2f(0.5), mirrored.size - 0.5) / mirrored.size;
+    let uv = clamp(texel, vec2f(0.5), mirrored.size - 0.5) / vec2f(textureDimensions(buffer_light)); // black beyond
     let found = textureSampleLevel(buffer_light, linear_sampler, uv, wanted);
     return found.rgb / max(found.a, 1e-3);
 }
