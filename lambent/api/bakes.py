@@ -42,8 +42,6 @@ class Interreflection:
         Whether materials that look the same are merged, to save memory.
     diffuse_seen : bool
         Whether surfaces seen in others are treated as diffuse.
-    workers : int or str, optional
-        Processes on this machine, or the address of a Dask scheduler; by default this process.
     """
 
     series: str = "64,1,1,1"
@@ -52,7 +50,6 @@ class Interreflection:
     editable: Sequence[str] = ()
     merge: bool = False
     diffuse_seen: bool = False
-    workers: int | str | None = None
 
 
 def bake(
@@ -71,6 +68,7 @@ def bake(
     views: Sequence[str] = (),
     session: str | Path | None = None,
     interreflection: Interreflection | None = None,
+    on: int | str | None = None,
     note: Note | None = None,
     progress: Wanted = None,
 ) -> Store:
@@ -106,6 +104,9 @@ def bake(
         Session of edits, whose view is baked with its materials and its environment.
     interreflection : Interreflection, optional
         For `only` with "interreflection".
+    on : int or str, optional
+        A number of processes of this machine, or the address of a Dask scheduler, such as "tcp://10.0.0.1:8786", whose
+        workers trace; by default this process.
     note : callable, optional
         Called with sentences about what is baked for interreflections.
     progress : bool or callable, optional
@@ -128,7 +129,7 @@ def bake(
         if INTERREFLECTION in (only or ()):
             what, bounces = request.continued_or_proposed(folder, wanted, note or (lambda text: None), bar)
             watch = request.watch(what, folder, bounces, bar)
-        with _workers(wanted.workers) as workers:
+        with _workers(on) as workers:
             store = baked(
                 what, folder, quality=quality, only=only, resume=resume, seed=seed, light_map=light_map, probes=probes,
                 light_groups=light_groups, light_fields=light_fields, light_field_mb=light_field_mb, bounces=bounces,
@@ -290,12 +291,12 @@ def _check_lit(scene: Contents) -> None:
 
 
 @contextmanager
-def _workers(wanted: int | str | None) -> Iterator[Workers | None]:
-    """The workers that trace interreflections; None: this process."""
-    if wanted is None:
+def _workers(on: int | str | None) -> Iterator[Workers | None]:
+    """The workers that trace; None: this process."""
+    if on is None:
         yield None
         return
     from lambent.baking.running.cluster import opened
 
-    with opened(*((wanted, None) if isinstance(wanted, int) else (None, wanted))) as workers:
+    with opened(on) as workers:
         yield workers

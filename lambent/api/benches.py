@@ -17,6 +17,7 @@ def run_bench(
     *,
     quick: bool = False,
     inputs: Sequence[str | Path] = (),
+    output: str | Path | None = None,
     progress: Wanted = None,
     **sizes: Any,
 ) -> dict[str, Any]:
@@ -30,6 +31,8 @@ def run_bench(
         The same rows at a smaller size.
     inputs : sequence of str or Path
         Files to measure, for a bench that takes some.
+    output : str or Path, optional
+        File of finished rows, for bench card, which continues it.
     progress : bool or callable, optional
         As of `Table.fit`.
     **sizes
@@ -54,4 +57,5 @@ def run_bench(
         effort = module.QUICK if quick else module.FULL
         for size in sizes:
             known("size", size, vars(effort), field=name)
-        return run(name, replace(effort, **sizes), inputs=[Path(one) for one in inputs], progress=bar)
+        file, read = None if output is None else Path(output), [Path(one) for one in inputs]
+        return run(name, replace(effort, **sizes), inputs=read, output=file, progress=bar)

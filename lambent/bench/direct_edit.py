@@ -109,11 +109,11 @@ def _scene_rows(name: str, case: Case, effort: Effort) -> list[dict[str, Any]]:
     session = Session.new(name, scene.cameras[0], {case.material: start}, size=(effort.size, effort.size))
     pictures, rows = [], []
     with tempfile.TemporaryDirectory() as folder:
-        _baked(scene, Path(folder) / "warm", effort.lights[0], 16)
+        baked_view(scene, Path(folder) / "warm", effort.lights[0], 16)
         for lights in effort.lights:
             path = Path(folder) / str(lights)
             began = time.perf_counter()
-            store = _baked(scene, path, lights, effort.size)
+            store = baked_view(scene, path, lights, effort.size)
             seconds, timings = time.perf_counter() - began, store.documents["timings"]
             stored = folder_bytes(path)
             began = time.perf_counter()
@@ -144,7 +144,7 @@ def _edited(material: Material) -> Material:
     return material.model_copy(update={"lobes": tuple(lobes), "kd": triple(np.multiply(material.kd, (1.0, 0.7, 0.5)))})
 
 
-def _baked(scene: Scene, folder: Path, lights: int, size: int) -> Store:
+def baked_view(scene: Scene, folder: Path, lights: int, size: int) -> Store:
     quality = quality_named("normal").changed("bench", visibility={"lights": (lights,)})
     return bake(scene, folder, quality=quality, only={"transport"}, views=[View(scene.cameras[0], size, size)])
 

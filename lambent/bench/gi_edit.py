@@ -133,7 +133,7 @@ def run(effort: Effort, settings: int | None = None, progress: Progress = silent
     return {"rows": rows + compared, "summary": {"reference_spp": effort.reference_spp, "best_series": best}}
 
 
-class _Room:
+class Room:
     """One view of a scene in its own store, with its direct light."""
 
     def __init__(self, case: Case, size: tuple[int, int], folder: Path, lights: int) -> None:
@@ -206,8 +206,8 @@ def _stored(store: Store) -> int:
 def _row(case: Case, effort: Effort) -> dict[str, Any]:
     width, height = (edge // effort.shrink for edge in case.size)
     with tempfile.TemporaryDirectory() as folder:
-        _Room(case, (16, 12), Path(folder) / "warm", 16).bake(case.series, 16)
-        room = _Room(case, (width, height), Path(folder) / "room", effort.lights)
+        Room(case, (16, 12), Path(folder) / "warm", 16).bake(case.series, 16)
+        room = Room(case, (width, height), Path(folder) / "room", effort.lights)
         first = room.bake(case.series, min(16, effort.samples))
         whole = first + room.bake(case.series, effort.samples)
         light = room.light()
@@ -215,7 +215,7 @@ def _row(case: Case, effort: Effort) -> dict[str, Any]:
         rate = points * effort.samples / whole
         terms = [(len(part.pixel), term) for part in light.parts.values() for term in part.terms]
         room_for = sum(count * term.bands * len(light.tails) for count, term in terms)
-        small = _Room(
+        small = Room(
             case, (width // effort.error_shrink, height // effort.error_shrink), Path(folder) / "small", effort.lights
         )
         return {
@@ -230,14 +230,14 @@ def _row(case: Case, effort: Effort) -> dict[str, Any]:
         }  # fmt: skip
 
 
-def _times(room: _Room, light: Interreflections, effort: Effort) -> dict[str, Any]:
+def _times(room: Room, light: Interreflections, effort: Effort) -> dict[str, Any]:
     """Times of freezing each material for edits of its sharpest curve, and of frames while dragging one."""
     whole, freezing = room.picture(light), {}
     whole.draw()
     for name in light.parts:
         if name not in room.fixed:
             began = time.perf_counter()
-            FrozenPicture(light, room.start, name, whole.direct.canvas, {_sharpest(light.parts[name])})
+            FrozenPicture(light, room.start, name, whole.direct.canvas, {sharpest(light.parts[name])})
             freezing[name] = time.perf_counter() - began
     material, frames = room.case.material, []
     curve = next(name for name in room.start[material].curves if "highlight" in name)
@@ -258,14 +258,14 @@ def _times(room: _Room, light: Interreflections, effort: Effort) -> dict[str, An
     }  # fmt: skip
 
 
-def _sharpest(part: PartLight) -> str:
+def sharpest(part: PartLight) -> str:
     """The curve with the most bands."""
     pairs = zip(part.start.terms, part.terms, strict=True)
     counts = [one for term, light in pairs for one in zip(light.counts, term.factors, strict=True)]
     return max(counts, key=lambda one: one[0])[1].curve
 
 
-def _errors(room: _Room, large: _Room, effort: Effort) -> dict[str, Any]:
+def _errors(room: Room, large: Room, effort: Effort) -> dict[str, Any]:
     """Errors for the scene as it is and for the settings; the rival's time in the large view for the first one."""
     states, pictures = [room.start, *room.settings(effort.settings)], []
     for samples in (effort.error_samples // 2, effort.error_samples):
@@ -302,7 +302,7 @@ def _error(half: Floats, full: Floats, references: tuple[Floats, Floats], inner:
 
 
 def _rival(
-    room: _Room, large: _Room, state: dict[str, Editable], converged: Floats, wanted: float, effort: Effort
+    room: Room, large: Room, state: dict[str, Editable], converged: Floats, wanted: float, effort: Effort
 ) -> dict[str, Any]:
     """The fewest samples that reach the error in the small view, and their seconds in the large one."""
     from lambent.baking.reference.path_traced import tracer_of
@@ -330,7 +330,7 @@ def _series(case: Case, effort: Effort) -> list[dict[str, Any]]:
     size = effort.edge, round(effort.edge * case.size[1] / case.size[0])
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        room = _Room(case, size, Path(folder), effort.lights)
+        room = Room(case, size, Path(folder), effort.lights)
         settings, inner = room.settings(effort.settings), room.inner()
         references = [np.mean(room.reference(state, SURFACES, effort.reference_spp), axis=0) for state in settings]
         for series in effort.series:

@@ -3,8 +3,8 @@
 A bench is a module of this package, or of `pictures`, with `NAME`, its efforts `FULL` and `QUICK` (instances of its own
 frozen dataclass), and `run(effort, progress=silent)`, which returns {"rows": [...], "summary": {...}}. If it reads
 files, `run` also takes `inputs`; if it compares with published figures, `against`; with finished pictures, `reference`;
-if it draws random settings, `settings`. docs/performance.md defines names, rows and fields; times are medians of at
-least five alternating runs, reported with their spread.
+if it draws random settings, `settings`; if it writes rows to a file as they come, `output`. docs/performance.md defines
+names, rows and fields; times are medians of at least five alternating runs, reported with their spread.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ def run_bench(
     against: Sequence[Path] = (),
     reference: Sequence[Path] = (),
     settings: int | None = None,
+    output: Path | None = None,
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """Run one bench; the report has bench, machine, inputs, rows and summary, ready for JSON.
@@ -53,6 +54,8 @@ def run_bench(
         Files for a bench that takes them; see the head of this module.
     settings : int, optional
         Number of random settings, for a bench that draws them.
+    output : Path, optional
+        File of a bench that writes one.
 
     Raises
     ------
@@ -68,6 +71,7 @@ def run_bench(
     read = {"inputs": inputs, "against": against, "reference": reference}
     options: dict[str, Any] = {key: list(paths) for key, paths in read.items() if paths}
     options |= {"settings": settings} if settings is not None else {}
+    options |= {"output": output} if output is not None else {}
     refused = options.keys() - inspect.signature(module.run).parameters.keys()
     if "inputs" in refused:
         raise UserError("this bench takes no inputs", got=inputs[0])
@@ -75,6 +79,8 @@ def run_bench(
         raise UserError("this bench takes no reference", field="--reference", got=name)
     if "settings" in refused:
         raise UserError("this bench has no random settings", field="--settings", got=name)
+    if "output" in refused:
+        raise UserError("this bench writes no file", field="-o", got=output, hint="--json prints its rows")
     if refused:
         raise UserError("this bench takes no published fits", field="--against", got=name)
     if isinstance(effort, str):

@@ -98,10 +98,12 @@ def command(
             help="Print the materials that interreflections would cover, with time and memory; bake nothing.",
         ),
     ] = False,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Interreflections: number of processes on this machine.")
+    on: Annotated[
+        str | None,
+        typer.Option(
+            help="Trace on N new processes of this machine, or on a cluster: tcp://HOST:PORT of its scheduler."
+        ),
     ] = None,
-    cluster: Annotated[str | None, typer.Option(help="Interreflections: address of a Dask scheduler.")] = None,
     crease_angle: CreaseAngle = None,
     json: Json = False,
 ) -> None:
@@ -123,15 +125,11 @@ def command(
 
     if output is None and not propose_:
         raise UserError("no output folder", field="-o", hint="add -o STORE, or --propose to see what a bake takes")
-    if workers is not None and cluster is not None:
-        raise UserError("--workers and --cluster exclude each other", field="--cluster", hint="leave out one")
     start = time.perf_counter()
     found = scene_of_session(scene, edit, crease_angle)
     what, loading = found.contents, time.perf_counter() - start
     _say_warnings(what.warnings)
-    wanted = Interreflection(
-        series, samples, fixed or (), editable or (), merge, diffuse_seen, workers if cluster is None else cluster
-    )
+    wanted = Interreflection(series, samples, fixed or (), editable or (), merge, diffuse_seen)
     if propose_:
         said = propose(found, views=view or (), session=edit, interreflection=wanted, store=output, progress=True)
         show({"proposals": [one.said() for one in said]}, "\n\n".join("\n".join(one.lines()) for one in said), json)
@@ -139,7 +137,8 @@ def command(
     store = bake(
         found, cast(Path, output), quality=quality, only=only, resume=resume, seed=seed, light_map=light_map,
         probes=probes, light_groups=light_groups, light_fields=light_fields, light_field_mb=light_field_mb,
-        views=view or (), session=edit, interreflection=wanted, note=say, progress=True,
+        views=view or (), session=edit, interreflection=wanted,
+        on=int(on) if on is not None and on.isdecimal() else on, note=say, progress=True,
     ).arrays  # fmt: skip
     arrays = {artefact.name: artefact.state for artefact in store.artefacts()}
     daylight = [("daylight", daylight_in_words(what.environment))] if isinstance(what.environment, SunSky) else []

@@ -26,11 +26,17 @@ def command(
             help="Benches equal-time, accumulate: path traced .exr of the input's first camera, equal in samples."
         ),
     ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", help="Bench card: file of finished rows, which a later run continues. [default: card.json]"),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Run a bench and print its rows and the machine.
 
     Example: lambent bench fit --quick --json
+
+    Example: lambent bench card -o card.json
     """
     from lambent.bench.registry import run_bench
 
@@ -38,9 +44,9 @@ def command(
         effort = "quick" if quick else "full"
         report = run_bench(
             name, effort, inputs=input_ or (), against=against or (), reference=reference or (), settings=settings,
-            progress=progress,
+            output=output, progress=progress,
         )  # fmt: skip
     names = list(dict.fromkeys(key for row in report["rows"] for key in row))
-    rows = [names, *([words(row.get(key, "")) for key in names] for row in report["rows"])]
+    rows = [names, *([words("" if row.get(key) is None else row[key]) for key in names] for row in report["rows"])]
     summary = [(key, words(value)) for key, value in {**report["machine"], **report["summary"]}.items()]
     show(report, f"{table(rows)}\n\n{table(summary)}", json)

@@ -21,7 +21,7 @@ HEAVY = ("numpy", "scipy", "mitsuba", "drjit", "wgpu", "imgui_bundle", "matplotl
 # Changing a line here changes what users' scripts rely on: see CONTRIBUTING.md, "Public names".
 SIGNATURES = """
 bake(scene, folder, *, quality, only, resume, seed, light_map, probes, light_groups, light_fields, light_field_mb,\
- views, session, interreflection, note, progress)
+ views, session, interreflection, on, note, progress)
 check(subject, *, seed, reconstruction, progress, **values)
 compare(reference, test)
 convert(subject, file, *, as_, reconstruction, progress)
@@ -30,7 +30,7 @@ glare(what, camera, *, threshold_cd_m2, note, progress, **settings)
 open(folder)
 propose(scene, *, views, session, interreflection, store, progress)
 read(file, *, reconstruction, crease_deg)
-run_bench(name, *, quick, inputs, progress, **sizes)
+run_bench(name, *, quick, inputs, output, progress, **sizes)
 window(what, mode, *, size, **options)
 Comparison.flip
 Comparison.psnr_db

@@ -39,7 +39,7 @@ def test_every_bench_has_the_agreed_face():
         assert type(module.FULL) is type(module.QUICK) and module.FULL != module.QUICK, name
         parameters = list(inspect.signature(module.run).parameters)
         assert parameters[0] == "effort" and parameters[-1] == "progress", name
-        assert set(parameters[1:-1]) <= {"inputs", "against", "reference", "settings"}, name
+        assert set(parameters[1:-1]) <= {"inputs", "against", "reference", "settings", "output"}, name
 
 
 def test_report(ruler, tmp_path):
@@ -67,6 +67,8 @@ def test_files_that_a_bench_does_not_read(ruler, tmp_path):
     for name in ("walk-cube", "planar-quality"):
         with pytest.raises(UserError, match="takes no inputs"):
             run_bench(name, inputs=[tmp_path / "a"])
+    with pytest.raises(UserError, match="-o: this bench writes no file"):
+        run_bench("ruler", output=tmp_path / "b")
     with pytest.raises(UserError, match="takes no published fits"):
         run_bench("ruler", against=[tmp_path / "a"])
 

@@ -49,7 +49,7 @@ WRONG = {
     "bake scene.toml -o s --only transport --edit half.edits.json": "half.edits.json: scene: is missing",
     "bake scene.toml -o s --only interreflection": "--view: is missing",
     "bake scene.toml -o s --editable paint": "--editable: applies to interreflections only",
-    f"bake scene.toml -o s --only interreflection {BOUNCED} --workers 2 --cluster a:1": "exclude each other",
+    "bake builtin:box -o s --on 0": "--on: no workers; found 0; expected at least 1",
     "bake builtin:box --propose": "--view",
     f"{PROPOSED} --series 64": "expected 2 to 6 numbers",
     f"{PROPOSED} --series 63,1": "expected powers of two",

@@ -1,8 +1,8 @@
 """Jobs on other processes and machines, by Dask (`distributed`).
 
-    with opened(count=8) as workers:                         # processes of this machine
-        bake(scene, folder, only={"interreflection"}, views=[view], workers=workers)
-    with opened(address="tcp://10.0.0.1:8786") as workers:   # a cluster that runs already
+    with opened(8) as workers:                         # processes of this machine
+        bake(scene, folder, workers=workers)
+    with opened("tcp://10.0.0.1:8786") as workers:     # a cluster that runs already
         ...
 
 Only this process reads and writes the store. Work and jobs travel as bytes within Dask's tasks, so that the scheduler
@@ -36,8 +36,8 @@ _one_at_a_time = threading.Lock()  # a job uses all threads of its process
 
 
 @contextmanager
-def opened(count: int | None = None, address: str | None = None) -> Iterator[DaskWorkers]:
-    """`count` new processes on this machine, or the workers of the cluster at `address`, which outlive this context.
+def opened(on: int | str) -> Iterator[DaskWorkers]:
+    """That many new processes of this machine, or the workers of the cluster at an address, which outlive this context.
 
     New processes start Python afresh: a script needs `if __name__ == "__main__":`.
 
@@ -49,20 +49,18 @@ def opened(count: int | None = None, address: str | None = None) -> Iterator[Das
     try:
         import distributed
     except ImportError as error:
-        raise UserError("Dask is not installed", field="workers", hint="pip install 'lambent[cluster]'") from error
-    if (count is None) == (address is None):
-        raise UserError("workers and cluster exclude each other", field="workers", expected="one of both")
-    if count is not None and count < 1:
-        raise UserError("no workers", field="workers", got=count, expected="at least 1")
+        raise UserError("Dask is not installed", field="--on", hint="pip install 'lambent[cluster]'") from error
+    if isinstance(on, int) and on < 1:
+        raise UserError("no workers", field="--on", got=on, expected="at least 1, or the address of a scheduler")
     warnings.filterwarnings("ignore", "Sending large graph")  # sending tiles with their jobs is intended
     with ExitStack() as stack:
-        threads = None
-        if count is not None:
+        threads, address = None, str(on)
+        if isinstance(on, int):
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="lambent-"))
-            threads = max(1, engine().threads // count)
+            threads = max(1, engine().threads // on)
             with _deaf():
                 local = distributed.LocalCluster(
-                    n_workers=count, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0",
+                    n_workers=on, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0",
                     memory_limit=0, local_directory=folder,
                 )  # fmt: skip
             address = stack.enter_context(local).scheduler_address
@@ -72,7 +70,7 @@ def opened(count: int | None = None, address: str | None = None) -> Iterator[Das
             client.wait_for_workers(1, timeout=SECONDS)
         except (OSError, TimeoutError, ValueError) as error:
             hint = "start a scheduler with `dask scheduler` and workers with `dask worker ADDRESS --nthreads 1`"
-            raise UserError("no worker answered", field="cluster", got=address, hint=hint) from error
+            raise UserError("no worker answered", field="--on", got=address, hint=hint) from error
         yield DaskWorkers(client, threads)
 
 
@@ -89,7 +87,7 @@ def _deaf() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-async def _connect(address: str | None) -> None:
+async def _connect(address: str) -> None:
     """Raise connection errors early. A `Client` that cannot connect may block the next one when garbage collected."""
     from distributed import Security
     from distributed.comm import connect
@@ -131,7 +129,7 @@ class DaskWorkers:
                     done = wait(list(waiting), return_when="FIRST_COMPLETED").done
                 except asyncio.CancelledError as error:
                     hint = "finished work is kept; run the same command to continue"
-                    raise UserError("lost the connection to the scheduler", field="cluster", hint=hint) from error
+                    raise UserError("lost the connection to the scheduler", field="--on", hint=hint) from error
                 for future in done:
                     yield waiting.pop(future), _result(future)
         finally:
@@ -150,7 +148,7 @@ def _result(future: Any) -> Any:
         return future.result()
     except KilledWorker as error:
         hint = "see their logs; where memory is short, use fewer workers"
-        raise UserError("several workers died while tracing the same tile", field="workers", hint=hint) from error
+        raise UserError("several workers died while tracing the same tile", field="--on", hint=hint) from error
 
 
 def _same(work: bytes) -> bytes:
@@ -164,7 +162,7 @@ def _do(work: bytes, job: bytes, makers: dict[str, str], threads: int | None) ->
         mine = made_with()
         for name, wanted in makers.items():
             if mine[name] != wanted:
-                raise UserError(f"a worker has a different {name}", field="workers", got=mine[name], expected=wanted)
+                raise UserError(f"a worker has a different {name}", field="--on", got=mine[name], expected=wanted)
         if threads is not None:
             _limit(threads)
         return _loaded(work)(pickle.loads(job))

@@ -29,10 +29,13 @@ CAMERAS = {
 
 def run(effort: Effort, progress: Progress = silent) -> dict[str, Any]:
     """Rows integrator x coverage x n."""
+    return report(effort, scenes(effort.width, effort.height), progress)
+
+
+def scenes(width: int, height: int) -> dict[str, tuple[Renderer, FrameState]]:
+    """Renderer and frame for each coverage."""
     renderer = Renderer(open_device(), planar_scene.planar_scene(lobe_of(0.1, 0.1)))
-    size = effort.width, effort.height
-    scenes = {
-        coverage: (renderer, FrameState(camera, *size, lookup="plain", antialias=False))
+    return {
+        coverage: (renderer, FrameState(camera, width, height, lookup="plain", antialias=False))
         for coverage, camera in CAMERAS.items()
     }
-    return report(effort, scenes, progress)
