@@ -18,6 +18,10 @@ LAYERS = 4
 BLOCK = 64  # texels: size of the blocks in which regions are cut out for denoising, with neighbouring blocks
 MOST = 0.7  # share of a map above which it is denoised whole
 RIM = 32  # texels mirrored at the borders, where the filter otherwise errs by up to 20 %
+# Texels darker than DARK times a map's geometric mean are filtered with that mean brought to EXPOSED. The filter's own
+# exposure lets them vanish in its rounding: beside light 1,000 times as bright they turn colourful. The squared error
+# of the darkest tenth falls by a tenth in two rooms, that of a map half in the dark by half.
+EXPOSED, DARK = 100.0, 0.1
 
 
 def fill(values: Floats, known: Flags, labels: Indices, *, smooth: int = 0) -> Floats:
@@ -107,14 +111,20 @@ class _Grown:
 
 
 def denoise(irradiance: Floats) -> Floats:
-    """Denoise a light map (H, W, 3) without gutters by Open Image Denoise's light map filter."""
+    """Denoise a light map (H, W, 3) without gutters by Open Image Denoise's light map filter, at two exposures."""
     import pyoidn
 
     if not irradiance.any():
         return irradiance  # the filter would amplify its own rounding errors
-    rim = ((RIM, RIM), (RIM, RIM), (0, 0))
-    noisy = np.pad(irradiance, rim, mode="symmetric")
-    return _filtered(pyoidn.OIDN_FILTER_TYPE_RT_LIGHTMAP, {pyoidn.OIDN_IMAGE_COLOR: noisy})[RIM:-RIM, RIM:-RIM]
+    images = {pyoidn.OIDN_IMAGE_COLOR: np.pad(irradiance, ((RIM, RIM), (RIM, RIM), (0, 0)), mode="symmetric")}
+    light = luminance(np.asarray(irradiance, np.float64))
+    mean = float(np.exp(np.log(light[light > 0]).mean()))
+    bright, dark = (
+        _filtered(pyoidn.OIDN_FILTER_TYPE_RT_LIGHTMAP, images, scale=scale)[RIM:-RIM, RIM:-RIM]
+        for scale in (None, EXPOSED / mean)
+    )
+    share = 1 / (1 + (luminance(dark) / (DARK * mean)) ** 2)
+    return bright + share[..., None] * (dark - bright)
 
 
 def denoise_image(radiance: Floats, albedo: Floats, normal: Floats, *, fast: bool = False) -> Floats:
@@ -135,8 +145,10 @@ def denoise_image(radiance: Floats, albedo: Floats, normal: Floats, *, fast: boo
     return _filtered(pyoidn.OIDN_FILTER_TYPE_RT, images, quality=quality, hdr=True)
 
 
-def _filtered(kind: str, images: Mapping[str, Floats], quality: int | None = None, **options: bool) -> Floats:
-    """The output (H, W, 3) of an Open Image Denoise filter, clamped at 0."""
+def _filtered(
+    kind: str, images: Mapping[str, Floats], quality: int | None = None, scale: float | None = None, **options: bool
+) -> Floats:
+    """The output (H, W, 3) of an Open Image Denoise filter, clamped at 0; without a `scale`, at its own exposure."""
     import pyoidn
 
     inputs = {name: np.ascontiguousarray(image, np.float32) for name, image in images.items()}
@@ -150,6 +162,8 @@ def _filtered(kind: str, images: Mapping[str, Floats], quality: int | None = Non
                 one.set_bool(name, value)
             if quality is not None:
                 one.set_int("quality", quality)
+            if scale is not None:
+                one.set_float("inputScale", scale)
             one.commit()
             one.execute()
         error = device.get_error()

@@ -43,6 +43,16 @@ def test_darkness_stays_dark() -> None:
     assert not denoise(np.zeros((16, 16, 3))).any()
 
 
+@pytest.mark.parametrize("contrast", [1, 100, 1000, 10000])
+def test_a_dark_part_of_a_chart_keeps_its_light_and_its_grey(contrast: float) -> None:
+    """A floor that passes from a dark room into a bright one; noise is equal in all channels."""
+    rng = np.random.default_rng(1)
+    truth = np.where(np.arange(128) < 64, 1.0, contrast)[None, :, None] * np.ones((128, 1, 3)) * 0.01
+    found = (denoise(truth * rng.gamma(4, 1 / 4, (128, 128, 1))) / truth)[:, :56]
+    assert np.sqrt(np.mean((found - 1) ** 2)) < 0.1 and found.mean() == pytest.approx(1, abs=0.05)
+    assert (found.max(axis=-1) < 1.05 * found.min(axis=-1)).mean() > 0.93
+
+
 def test_a_bright_chart_stays_out_of_a_dark_one_beside_it() -> None:
     labels = np.full((64, 64), -1)
     labels[:, :31], labels[:, 33:] = 3, 7
@@ -53,7 +63,7 @@ def test_a_bright_chart_stays_out_of_a_dark_one_beside_it() -> None:
     assert {int(layers[0, 0]), int(layers[0, 63])} == {0, 1} and layers[0, 32] == -1
     clean, joined = denoise_charts(noisy, known, labels), denoise(fill(noisy, known, labels))
     assert clean[:, 30].mean() == pytest.approx(1, abs=0.1), joined[:, 30].mean()
-    assert abs(joined[:, 30].mean() - 1) > 0.5, "in one layer the filter smears"
+    assert abs(joined[:, 30].mean() - 1) > 0.3, "in one layer the filter smears"
     assert clean[:, 33:36].mean() == pytest.approx(100, abs=10)
     assert not layers_of(np.where(known, 1.0, 0.0)[..., None] * np.ones(3), known, labels)[known].any()
 
