@@ -31,10 +31,10 @@ def turned_inwards(mesh: Mesh) -> Mesh:
     return replace(mesh, normals=-mesh.normals, faces=np.ascontiguousarray(mesh.faces[:, ::-1]))
 
 
-def furnace() -> Scene:
-    """A closed diffuse box, albedo .5, emission .5: radiance 1 everywhere, irradiance pi."""
-    room = SceneObject("room", turned_inwards(box((2, 2, 2))), "grey", emission=(0.5, 0.5, 0.5))
-    return Scene("furnace", (room,), {"grey": GREY})
+def furnace(albedo: float = 0.5) -> Scene:
+    """A closed diffuse box, emission 1 - albedo: radiance 1 everywhere, irradiance pi."""
+    room = SceneObject("room", turned_inwards(box((2, 2, 2))), "grey", emission=(1 - albedo,) * 3)
+    return Scene("furnace", (room,), {"grey": Material(kd=albedo)})
 
 
 def plane() -> Scene:

@@ -63,9 +63,9 @@ class Settings:
 
 
 SETTINGS = {
-    QualityName.preview: Settings((32, 32), 0.30, 24, gather_samples=128),
-    QualityName.normal: Settings((64, 192), 0.15, 24, gather_samples=512, photons_per_texel=512, gather_noise=0.04),
-    QualityName.final: Settings((256, 8192), 0.015, 24, photons_per_texel=4096),
+    QualityName.preview: Settings((32, 32), 0.30, 64, gather_samples=128),
+    QualityName.normal: Settings((64, 192), 0.15, 64, gather_samples=512, photons_per_texel=512, gather_noise=0.04),
+    QualityName.final: Settings((256, 8192), 0.015, 64, photons_per_texel=4096),
 }
 
 

@@ -21,7 +21,7 @@ from lambent.baking.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats
 from lambent.core.geometry.triangles import triangle_areas
 
-MAX_DEPTH = 16  # surfaces on the longest path of a picture, mirrors included
+MAX_DEPTH = 64  # surfaces on the longest path, mirrors included; in a white room (albedo .9), 16 lose 9 % of the light
 NEAR_TEXELS = 3.0  # a surface that a gathering path meets within this many of its own texels gathers once more
 
 

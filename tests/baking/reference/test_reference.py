@@ -42,8 +42,9 @@ def test_field_of_view_is_the_full_vertical_angle() -> None:
     assert image[:, 16, 0].sum() == pytest.approx(64 * 0.5 / np.tan(np.pi / 6), abs=0.5)
 
 
-def test_furnace_is_one_and_the_variance_tells_the_noise() -> None:
-    image, variance = render_reference(furnace(), CAMERA, 32, 24, 64, max_depth=40)
+@pytest.mark.parametrize("albedo", [0.5, 0.9])
+def test_furnace_is_one_and_the_variance_tells_the_noise(albedo: float) -> None:
+    image, variance = render_reference(furnace(albedo), CAMERA, 32, 24, 256)
     assert abs(image.mean() - 1) < 5 * np.sqrt(variance.mean() / (32 * 24))
     z = (image.mean(axis=-1) - 1) / np.sqrt(variance.mean(axis=-1))
     assert 0.8 < z.std() < 1.2
