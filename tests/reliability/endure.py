@@ -2,7 +2,7 @@
 
     python -m tests.reliability.endure --minutes 15 --out endured.json
 
-A round copies a prepared folder, kills one to three processes after random parts of the time that an undisturbed one
+A round copies a prepared folder, kills one to seven processes after random parts of the time that an undisturbed one
 takes, and checks after each kill that what is left can be used. Then a last process runs undisturbed, and its result
 must equal, bit for bit, that of one that was never disturbed. `--job NAME` restricts it.
 """
@@ -26,7 +26,9 @@ import numpy as np
 
 from tests.reliability.endured import JOBS, copied
 
-_PROCESSES = multiprocessing.get_context("spawn")  # Dr.Jit does not work in a forked process
+_PROCESSES = multiprocessing.get_context("forkserver")  # of what is imported; Dr.Jit begins in each process anew
+_PROCESSES.set_forkserver_preload(["tests.reliability.endured"])
+MOST_KILLS = 7  # of a round
 
 
 @dataclass
@@ -57,7 +59,7 @@ class Endurance:
     def round(self, random: np.random.Generator, result: Result) -> None:
         """Kill processes, check what they left, and let one finish; raises what a check raises."""
         copied(self._start, self._copy)
-        for _ in range(random.integers(1, 4)):
+        for _ in range(random.integers(1, MOST_KILLS + 1)):
             if killed(self._job.work, self._copy, random.uniform(0, self._lasts_s)):
                 result.kills[self._name] += 1
             else:

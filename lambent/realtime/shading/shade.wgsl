@@ -79,7 +79,7 @@ fn light_map(layer: u32, uv2: vec2f) -> vec3f {
 // The surface with its share of the probe's light: by direction if the light map has shares, else from its irradiance
 // e.
 fn with_shares(found: Surface, maps: texture_2d_array<f32>, uv2: vec2f, front: bool, e: vec3f) -> Surface {
-    if (object.sky_change.w > 0.5 && front) {
+    if ((object.sky_change.w > 0.5) & front) {
         var s = found;
         s.shares = layer_of(maps, SHARES, uv2).yzwx;
         return s;
@@ -114,7 +114,7 @@ fn surface_light(v: Varyings, front: bool) -> vec3f {
     e_here += max(facing, 0.0) * direct + of_lamps.here;
     let diffuse = diffuse_light(wo.z, e_bent, e_beyond + of_lamps.beyond, s.painted);
     var emitted = object.emission.rgb;
-    if (object.emission.w > 0.5) { emitted = radiance_of_opening(u32(object.emission.w) - 1u, view); }
+    if ((object.emission.w > 0.5) & front) { emitted = radiance_of_opening(u32(object.emission.w) - 1u, view); }
     emitted = select(vec3f(0.0), emitted, front);
 
     let specular = specular_light(wo, s) + of_lamps.specular;
