@@ -46,31 +46,54 @@ fn half_angle(doubled: vec2f) -> vec2f {
     return vec2f(sqrt(0.5 + 0.5 * c2), select(s, -s, doubled.y < 0.0));
 }
 
+const MOST_TAPS = 8.0;
+
+// Mean over a pixel's footprint, an ellipse: as many taps along its major axis as minor axes fit. Samplers of anisotropy
+// differ from adapter to adapter. Takes derivatives: call in uniform control flow.
+fn filtered(image: texture_2d<f32>, at: vec2f) -> vec4f {
+    let size = vec2f(textureDimensions(image));
+    let x = dpdxFine(at) * size;
+    let y = dpdyFine(at) * size;
+    let square = vec3f(x.x * x.x + y.x * y.x, x.x * x.y + y.x * y.y, x.y * x.y + y.y * y.y);
+    let apart = 0.5 * (square.x - square.z);
+    let root = sqrt(apart * apart + square.y * square.y);
+    let major = sqrt(0.5 * (square.x + square.z) + root);
+    let minor = max(max(abs(x.x * y.y - x.y * y.x) / max(major, 1e-12), major / MOST_TAPS), 1.0);
+    let along = select(vec2f(square.y, root - apart), vec2f(root + apart, square.y), apart > 0.0);
+    let axis = major * along / max(length(along), 1e-12) / size;
+    let taps = max(round(major / minor), 1.0);
+    var sum = vec4f(0.0);
+    for (var i = 0.5; i < taps; i += 1.0) {
+        sum += textureSampleLevel(image, texture_sampler, at + (i / taps - 0.5) * axis, log2(minor));
+    }
+    return sum / taps;
+}
+
 // Takes derivatives: call in uniform control flow.
 fn painted(uv: vec2f) -> Painted {
     var p = Painted(vec3f(1.0), vec3f(1.0), 1.0, vec2f(0.0), vec2f(0.0), vec2f(1.0, 0.0));
     if ((TEXTURES & 1u) != 0u) {
-        p.diffuse = material.diffuse_scale.rgb * textureSample(diffuse_texture, texture_sampler, place(0u, uv)).rgb;
+        p.diffuse = material.diffuse_scale.rgb * filtered(diffuse_texture, place(0u, uv)).rgb;
     }
     if ((TEXTURES & 2u) != 0u) {
-        p.specular = material.specular_scale.rgb * textureSample(specular_texture, texture_sampler, place(1u, uv)).rgb;
+        p.specular = material.specular_scale.rgb * filtered(specular_texture, place(1u, uv)).rgb;
     }
     if ((TEXTURES & 4u) != 0u) {
-        p.roughness = textureSample(roughness_texture, texture_sampler, place(2u, uv)).r;
+        p.roughness = filtered(roughness_texture, place(2u, uv)).r;
     }
     if ((TEXTURES & 8u) != 0u) {
-        let s = textureSample(normal_texture, texture_sampler, place(3u, uv));
+        let s = filtered(normal_texture, place(3u, uv));
         p.slope = s.xy;
         p.widening = max(s.zw, vec2f(0.0));
     }
     if ((TEXTURES & 16u) != 0u) {
-        p.turn = half_angle(textureSample(direction_texture, texture_sampler, place(4u, uv)).xy);
+        p.turn = half_angle(filtered(direction_texture, place(4u, uv)).xy);
     }
     return p;
 }
 
 fn is_hole(uv: vec2f) -> bool {
-    return textureSample(opacity_texture, texture_sampler, place(5u, uv)).r < material.diffuse_scale.w;
+    return filtered(opacity_texture, place(5u, uv)).r < material.diffuse_scale.w;
 }
 
 const SOLID = 0.95; // pixels of at least this coverage count as covered
@@ -79,7 +102,7 @@ const SOLID = 0.95; // pixels of at least this coverage count as covered
 // smaller texels, the share that passes the cutoff. Takes derivatives.
 fn coverage(uv: vec2f) -> f32 {
     let at = place(5u, uv);
-    let opacity = textureSample(opacity_texture, texture_sampler, at).rg;
+    let opacity = filtered(opacity_texture, at).rg;
     let texels = vec2f(textureDimensions(opacity_texture));
     let texels_per_px = max(length(dpdx(at) * texels), length(dpdy(at) * texels));
     let slope = length(vec2f(dpdx(opacity.r), dpdy(opacity.r)));

@@ -28,7 +28,6 @@ KINDS = tuple(CHANNELS)  # order of the bindings, and of the bits of TEXTURES, i
 BITS = {kind: 1 << i for i, kind in enumerate(KINDS)}
 WIDENING = BITS["roughness"] | BITS["normal"]  # textures that make lobes wider
 ROUGH_SHARE = 0.9  # quantile of a texture's roughness that sets the number of samples
-ANISOTROPY = 8
 _ALL_HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16)
 
 
@@ -115,8 +114,8 @@ class TextureCache:
         self._kept: list[Any] = []  # arrays kept alive, because the cache identifies them by address
         self._none = BoundTexture(self._uploaded([np.full((1, 1, 4), 255, np.uint8)], "rgba8unorm"))
         self.sampler = device.create_sampler(
-            mag_filter="linear", min_filter="linear", mipmap_filter="linear", max_anisotropy=ANISOTROPY,
-            address_mode_u="repeat", address_mode_v="repeat",
+            mag_filter="linear", min_filter="linear", mipmap_filter="linear", address_mode_u="repeat",
+            address_mode_v="repeat",
         )  # fmt: skip
 
     def of_material(self, textures: MaterialTextures | None) -> BoundTextures:

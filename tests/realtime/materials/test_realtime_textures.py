@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lambent.core.geometry.directions import normalize
 from lambent.core.light.colour import srgb_decode
 from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
@@ -235,3 +236,55 @@ def test_a_normal_map_bends_diffuse_light_as_it_leans(device, slope) -> None:
     mixed = 0.3 * lamp + 0.7 * np.array([0, 0, 2 / 3])
     assert shares(device, mixed, slope) == pytest.approx(0.3 * of_lamp + 0.7 * of_sky, rel=3e-3)
     assert shares(device, None, slope) == pytest.approx(1, rel=2e-3)  # where it is not known, light is not bent
+
+
+def test_footprints_are_filtered_alike_by_all_adapters(device) -> None:
+    """A square seen almost from its edge, over a corner: pixels cover slanted ellipses of up to eight texels by one."""
+    size, texels = 64, np.random.default_rng(1).random((128, 128, 3)).astype(np.float16)
+    scene = square(Material(name="m", kd=1.0), MaterialTextures(diffuse=texture(texels)))
+    camera = Camera("corner", (-0.65, -0.65, 0.16), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 20.0)
+    image = Renderer(device, scene).image(FrameState(camera, size, size))
+    encoded, scale = on_gpu.encoded(texels)
+    levels = [srgb_decode(level[..., :3] / np.float32(255)) * scale for level in encoded]
+    shown = slice(20, 48)
+    error = np.abs(image - _filtered(levels, _places(camera, size)))[shown, shown]
+    assert image[shown, shown].std() > 0.05 and error.mean() < 0.002
+
+
+def _places(camera: Camera, size: int) -> np.ndarray:
+    """Texel coordinates (size, size, 2), in shares of the texture, that pixels of a square frame see of the square."""
+    eye = np.array(camera.position)
+    forward = normalize(np.array(camera.target) - eye)
+    right = normalize(np.cross(forward, camera.up))
+    at = ((np.arange(size) + 0.5) / size * 2 - 1) * np.tan(np.radians(camera.fov_y_deg) / 2)
+    rays = forward + at[None, :, None] * right - at[:, None, None] * np.cross(right, forward)
+    hits = eye + rays * (-eye[2] / rays[..., 2:])
+    return np.stack([hits[..., 0] + 0.5, 0.5 - hits[..., 1]], axis=-1)
+
+
+def _filtered(levels: list[np.ndarray], at: np.ndarray) -> np.ndarray:
+    """`filtered` of material.wgsl; steps from pixel to pixel are those within blocks of 2 x 2."""
+    side = len(levels[0])
+    x = np.repeat(at[:, 1::2] - at[:, ::2], 2, axis=1) * side
+    y = np.repeat(at[1::2] - at[::2], 2, axis=0) * side
+    axes, lengths, _ = np.linalg.svd(np.stack([x, y], axis=-1))
+    major, minor = np.moveaxis(lengths, -1, 0)
+    minor = np.maximum(np.maximum(minor, major / 8), 1)
+    taps, found = np.maximum(np.round(major / minor), 1), np.zeros((*at.shape[:2], 3))
+    for k in range(8):
+        place = at + (((k + 0.5) / taps - 0.5) * major / side)[..., None] * axes[..., 0]
+        found += np.where((k < taps)[..., None], _trilinear(levels, place, np.log2(minor)), 0) / taps[..., None]
+    return found
+
+
+def _trilinear(levels: list[np.ndarray], at: np.ndarray, level: np.ndarray) -> np.ndarray:
+    found = np.zeros((*at.shape[:2], 3))
+    for number, texels in enumerate(levels):
+        share = np.clip(1 - np.abs(level - number), 0, 1)
+        texel = at * len(texels) - 0.5
+        low = np.floor(texel).astype(int)
+        for step in np.ndindex(2, 2):
+            weight = np.prod(1 - np.abs(texel - low - step), axis=-1)
+            column, row = np.moveaxis((low + np.array(step)) % len(texels), -1, 0)
+            found += (share * weight)[..., None] * texels[row, column]
+    return found
