@@ -66,9 +66,10 @@ def bake(context: BakeContext) -> None:
     work = TileTracer(scene, tails, bins, context.seed, context.view_tracer, bounces.diffuse_seen)
     for view in context.views:
         _put_tails(context, view)
+    shown = [(view, list(parts(context, view))) for view in context.views]
     for samples in passes(bounces.samples):
-        for view in context.views:
-            _bring(context, work, view, samples)
+        for view, found in shown:
+            _bring(context, work, view, found, samples)
     for view in context.views:
         context.put(KIND, view.name(KIND, "samples"), np.array([bounces.samples], np.uint32), view.meta)
 
@@ -81,11 +82,10 @@ def passes(samples: int) -> list[int]:
     return found
 
 
-def _bring(context: BakeContext, work: TileTracer, view: View, samples: int) -> None:
-    """Bring every tile of a view to `samples`."""
+def _bring(context: BakeContext, work: TileTracer, view: View, found: list[Part], samples: int) -> None:
+    """Bring every tile of a view to `samples`; `found` are its parts."""
     points = context.view_tracer.points(view)
     materials = np.array([o.material for o in context.in_views.objects])[points.object]
-    found = list(parts(context, view))
     mine = {part.material: np.flatnonzero(materials == part.material) for part in found}
     shown = {material: [numbers[some] for some in slices(len(numbers), POINTS)] for material, numbers in mine.items()}
     tiles = [(part, tile) for part in found for tile in range(len(shown[part.material]))]

@@ -68,6 +68,8 @@ def opened(on: int | str) -> Iterator[DaskWorkers]:
             asyncio.run(_connect(address))
             client = stack.enter_context(distributed.Client(address, timeout=SECONDS))
             client.wait_for_workers(1, timeout=SECONDS)
+            # By default results pass through the scheduler, whose network would limit a large cluster.
+            client.direct_to_workers = _reaches(client)
         except (OSError, TimeoutError, ValueError) as error:
             hint = "start a scheduler with `dask scheduler` and workers with `dask worker ADDRESS --nthreads 1`"
             raise UserError("no worker answered", field="--on", got=address, hint=hint) from error
@@ -94,6 +96,15 @@ async def _connect(address: str) -> None:
 
     comm = await connect(address, timeout=SECONDS, **Security().get_connection_args("client"))
     await comm.close()
+
+
+def _reaches(client: Any) -> bool:
+    """Whether this process can connect to a worker: some clusters show only their scheduler."""
+    try:
+        asyncio.run(_connect(next(iter(client.nthreads()))))
+    except (OSError, StopIteration):
+        return False
+    return True
 
 
 class DaskWorkers:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import pickle
 import signal
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -57,8 +59,12 @@ def two() -> Iterator[DaskWorkers]:
         yield workers
 
 
+def pids(workers: DaskWorkers) -> set[int]:
+    return set(workers.client.run(os.getpid).values())
+
+
 def kill_one(workers: DaskWorkers) -> None:
-    os.kill(min(workers.client.run(os.getpid).values()), signal.SIGKILL)
+    os.kill(min(pids(workers)), signal.SIGKILL)
 
 
 class Elsewhere:
@@ -124,6 +130,54 @@ def test_a_cluster_that_runs_already(two: DaskWorkers) -> None:
     with opened(two.client.scheduler.address) as workers:
         assert dict(workers.each(abs, [-1, 2, -3])) == {-1: 1, 2: 2, -3: 3}
     assert dict(two.each(abs, [-4])) == {-4: 4}
+
+
+class _Slow:
+    """A worker's plugin: each job takes some times as long, and most for one worker. A worker in a killed one's place too.
+
+    It changes the module in the worker's process, in no other.
+    """
+
+    def __init__(self, factor: float, slowest: float) -> None:
+        self.factor, self.slowest = factor, slowest
+
+    def setup(self, worker: Any) -> None:
+        from lambent.baking.running import cluster
+
+        loaded, factor = cluster._loaded, self.slowest if worker.name == 0 else self.factor
+
+        def slow(work: bytes) -> Any:
+            def done(job: Any) -> Any:
+                began = time.process_time()
+                found = loaded(work)(job)
+                time.sleep((factor - 1) * (time.process_time() - began))
+                return found
+
+            return done
+
+        cluster._loaded = slow  # type: ignore[assignment]
+
+
+@pytest.mark.long
+def test_a_cluster_of_slow_and_dying_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Eight workers of a quarter of the speed, one of a sixteenth; two are killed, one of them with the last tiles."""
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed")
+    monkeypatch.setattr("lambent.baking.artefacts.interreflection.POINTS", 16)  # dozens of tiles
+    slow = type("Slow", (_Slow, distributed.WorkerPlugin), {})(4.0, 16.0)
+    with opened(8) as workers:
+        workers.client.wait_for_workers(8)
+        workers.client.register_plugin(slow)
+        before, calls, kills = pids(workers), itertools.count(), (5, 50)
+
+        def progress(done: float, total: float, what: str) -> None:
+            if next(calls) in kills:
+                kill_one(workers)
+
+        found = baked(tmp_path / "s", workers, progress)
+        assert next(calls) > max(kills), "both were killed during the bake"
+        workers.client.wait_for_workers(8)
+        assert len(before - pids(workers)) == 2
+    assert_same(found, baked(tmp_path / "alone"))
 
 
 def test_a_job_that_kills_its_workers_is_given_up() -> None:
