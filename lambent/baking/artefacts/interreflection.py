@@ -1,7 +1,8 @@
 """Interreflections of a view: indirect light, by bands of the curves and by tails (`baked.transport.tails`).
 
 Each pass over all points doubles the samples, so that a picture is available early and its noise falls. A tile of
-points is one array, written whole: an interruption loses at most one tile's pass.
+points is one array, written whole: an interruption loses at most one tile's pass. Jobs for other processes go through
+several passes, because a tile's samples travel back and forth with each job.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ ON_REQUEST = True
 REVISION = 2
 POINTS = 1 << 12  # per tile
 FIRST_PASS, LONGEST_PASS = 16, 1 << 16  # samples
+TOGETHER = 1 << 10  # samples that jobs of other processes may end with, after passes in between
 
 
 @dataclass(frozen=True)
@@ -67,9 +69,9 @@ def bake(context: BakeContext) -> None:
     for view in context.views:
         _put_tails(context, view)
     shown = [(view, list(parts(context, view))) for view in context.views]
-    for samples in passes(bounces.samples):
+    for stops in stages(bounces.samples, together=context.workers.apart):
         for view, found in shown:
-            _bring(context, work, view, found, samples)
+            _bring(context, work, view, found, stops)
     for view in context.views:
         context.put(KIND, view.name(KIND, "samples"), np.array([bounces.samples], np.uint32), view.meta)
 
@@ -82,27 +84,39 @@ def passes(samples: int) -> list[int]:
     return found
 
 
-def _bring(context: BakeContext, work: TileTracer, view: View, found: list[Part], samples: int) -> None:
-    """Bring every tile of a view to `samples`; `found` are its parts."""
+def stages(samples: int, *, together: bool) -> list[list[int]]:
+    """The passes of a bake by jobs: one each, or `together` those after the first up to TOGETHER samples."""
+    first, *more = passes(samples)
+    joined = [one for one in more if together and one <= TOGETHER]
+    return [[first], *([joined] if joined else []), *([one] for one in more[len(joined) :])]
+
+
+def _bring(context: BakeContext, work: TileTracer, view: View, found: list[Part], stops: list[int]) -> None:
+    """Bring every tile of a view to the last of some numbers of samples, through the others; `found` are its parts."""
+    samples = stops[-1]
     points = context.view_tracer.points(view)
     materials = np.array([o.material for o in context.in_views.objects])[points.object]
     mine = {part.material: np.flatnonzero(materials == part.material) for part in found}
     shown = {material: [numbers[some] for some in slices(len(numbers), POINTS)] for material, numbers in mine.items()}
     tiles = [(part, tile) for part in found for tile in range(len(shown[part.material]))]
     behind = [one for one in tiles if _samples(context, *one) < samples]
+    behind.sort(
+        key=lambda one: -len(shown[one[0].material][one[1]])
+    )  # small ones last: no worker waits for a large one
     place = {part.names(tile)[0]: (part, tile) for part, tile in behind}
     what = f"interreflections, {samples} samples"
     context.progress(len(tiles) - len(behind), len(tiles), what)
-    jobs = (_job(context, part, tile, points.where(shown[part.material][tile]), samples) for part, tile in behind)
+    jobs = (_job(context, part, tile, points.where(shown[part.material][tile]), stops) for part, tile in behind)
     for done, (job, traced) in enumerate(context.workers.each(work, jobs), len(tiles) - len(behind) + 1):
         _write(context, *place[job.name], traced, samples)
         context.progress(done, len(tiles), what)
 
 
-def _job(context: BakeContext, part: Part, tile: int, points: ViewPoints, samples: int) -> Job:
+def _job(context: BakeContext, part: Part, tile: int, points: ViewPoints, stops: list[int]) -> Job:
     names, before = part.names(tile), _samples(context, part, tile)
     held = tuple(_held(context, name, len(points)) for name in names) if before else ()
-    return Job(part.material, points, names[0], samples, before, held)
+    *via, samples = (one for one in stops if one > before)
+    return Job(part.material, points, names[0], samples, before, held, tuple(via))
 
 
 def _held(context: BakeContext, name: str, points: int) -> Tile:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -86,7 +86,7 @@ class Job:
     """Points of a material to bring to a number of samples.
 
     `name` distinguishes their seeds from those of other points; `held` has the existing tiles of the material's terms
-    with their samples, or is empty.
+    with their samples, `before`, or is empty. `via` are numbers of samples on the way, as of jobs one after the other.
     """
 
     material: str
@@ -95,6 +95,7 @@ class Job:
     samples: int
     before: int = 0
     held: tuple[Tile, ...] = ()
+    via: tuple[int, ...] = ()
 
 
 class TileTracer:
@@ -120,6 +121,12 @@ class TileTracer:
 
     def __call__(self, job: Job) -> tuple[Tile, ...]:
         """The tiles of the terms of the job's material."""
+        for samples in job.via:
+            job = replace(job, before=samples, held=self._brought(replace(job, samples=samples)))
+        return self._brought(job)
+
+    def _brought(self, job: Job) -> tuple[Tile, ...]:
+        """Likewise, in one go."""
         engine()  # before Mitsuba is imported
         # Before the thread starts: imports and numba's compiler parse Python, which CPython 3.11 cannot do in two
         # threads.

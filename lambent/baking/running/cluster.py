@@ -110,6 +110,8 @@ def _reaches(client: Any) -> bool:
 class DaskWorkers:
     """The workers of a Dask client; see `lambent.baking.running.workers.Workers`."""
 
+    apart = True
+
     def __init__(self, client: Any, threads: int | None = None) -> None:
         self.client, self._threads = client, threads
 

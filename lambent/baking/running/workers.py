@@ -10,7 +10,12 @@ R = TypeVar("R")
 
 
 class Workers(Protocol):
-    """Runs self-contained jobs, with equal results in any process and any order."""
+    """Runs self-contained jobs, with equal results in any process and any order.
+
+    `apart`: in other processes, so that jobs and results travel, and few large ones cost less than many small ones.
+    """
+
+    apart: bool
 
     def each(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
         """Yield jobs with their results, in order of completion.
@@ -21,6 +26,8 @@ class Workers(Protocol):
 
 class InProcess:
     """Runs jobs in this process, in order."""
+
+    apart = False
 
     def each(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
         return ((job, work(job)) for job in jobs)

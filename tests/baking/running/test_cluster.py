@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lambent.baking.artefacts.interreflection import stages
 from lambent.baking.bake import bake
 from lambent.baking.interreflection.settings import Bounces
 from lambent.baking.running.cluster import DaskWorkers, opened
@@ -70,6 +71,8 @@ def kill_one(workers: DaskWorkers) -> None:
 class Elsewhere:
     """All that is done went through bytes, as to another process, and in another order."""
 
+    apart = True
+
     def each(self, work: Any, jobs: Any) -> Any:
         there = pickle.loads(pickle.dumps(work))
         return [(job, there(pickle.loads(pickle.dumps(job)))) for job in reversed(list(jobs))]
@@ -77,6 +80,12 @@ class Elsewhere:
 
 def test_tiles_depend_on_their_jobs_alone(alone: Store, tmp_path: Path) -> None:
     assert_same(baked(tmp_path / "s", Elsewhere()), alone)
+
+
+def test_jobs_of_other_processes_go_through_several_passes() -> None:
+    assert stages(3000, together=True) == [[16], [32, 64, 128, 256, 512, 1024], [2048], [3000]]
+    assert stages(64, together=False) == [[16], [32], [64]]
+    assert stages(5, together=True) == [[5]] and stages(20, together=True) == [[16], [20]]
 
 
 def test_what_is_interrupted_keeps_its_tiles(alone: Store, tmp_path: Path) -> None:
@@ -118,7 +127,7 @@ def test_a_worker_that_is_killed_is_survived(alone: Store, two: DaskWorkers, tmp
 
 def test_a_bake_that_is_interrupted_leaves_workers_that_go_on(alone: Store, two: DaskWorkers, tmp_path: Path) -> None:
     def stop(done: float, total: float, what: str) -> None:
-        if "32 samples" in what and done == 1:
+        if "64 samples" in what and done == 1:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -133,10 +142,7 @@ def test_a_cluster_that_runs_already(two: DaskWorkers) -> None:
 
 
 class _Slow:
-    """A worker's plugin: each job takes some times as long, and most for one worker. A worker in a killed one's place too.
-
-    It changes the module in the worker's process, in no other.
-    """
+    """A worker's plugin: each job takes some times as long, most with one worker. It changes only that process."""
 
     def __init__(self, factor: float, slowest: float) -> None:
         self.factor, self.slowest = factor, slowest
@@ -167,7 +173,7 @@ def test_a_cluster_of_slow_and_dying_workers(tmp_path: Path, monkeypatch: pytest
     with opened(8) as workers:
         workers.client.wait_for_workers(8)
         workers.client.register_plugin(slow)
-        before, calls, kills = pids(workers), itertools.count(), (5, 50)
+        before, calls, kills = pids(workers), itertools.count(), (5, 32)
 
         def progress(done: float, total: float, what: str) -> None:
             if next(calls) in kills:
