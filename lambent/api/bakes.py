@@ -106,7 +106,7 @@ def bake(
         For `only` with "interreflection".
     on : int or str, optional
         A number of processes of this machine, or the address of a Dask scheduler, such as "tcp://10.0.0.1:8786", whose
-        workers trace; by default this process.
+        workers trace interreflections; by default this process.
     note : callable, optional
         Called with sentences about what is baked for interreflections.
     progress : bool or callable, optional
@@ -124,7 +124,7 @@ def bake(
         from lambent.baking.bake import bake as baked
 
         request = _Request.of(scene, folder, views, session)
-        request.check(only, interreflection)
+        request.check(only, interreflection, on)
         what, bounces, watch = request.scene, _bounces(wanted, request.scene), None
         if INTERREFLECTION in (only or ()):
             what, bounces = request.continued_or_proposed(folder, wanted, note or (lambda text: None), bar)
@@ -210,18 +210,21 @@ class _Request:
         changed = frozenset(name for name, one in document.materials.items() if one.now != one.start)
         return cls(scene.merged(document.merged), edited, changed)
 
-    def check(self, only: Collection[str] | None, wanted: Interreflection | None) -> None:
+    def check(self, only: Collection[str] | None, wanted: Interreflection | None, on: int | str | None) -> None:
         """Raise `UserError` for views that no kind uses, and for settings of interreflections without them."""
         from lambent.baking import artefacts
+        from lambent.baking.running.cluster import check_count
 
+        if on is not None:
+            check_count(on)
         if self.edited["views"] and only is not None and not {*only} & {*modules_in(artefacts, having="OF_VIEWS")}:
             raise UserError("no kind uses the given view", field="--only", got=", ".join(only), expected="transport")
-        if wanted is None or INTERREFLECTION in (only or ()):
+        if INTERREFLECTION in (only or ()):
             return
-        for option in ("fixed", "editable", "merge"):
-            if getattr(wanted, option):
-                hint = "add --only interreflection"
-                raise UserError("applies to interreflections only", field=f"--{option}", hint=hint)
+        given = [option for option in ("fixed", "editable", "merge") if wanted is not None and getattr(wanted, option)]
+        if given or on is not None:
+            hint = "add --only interreflection"
+            raise UserError("applies to interreflections only", field=f"--{[*given, 'on'][0]}", hint=hint)
 
     def proposed(self, wanted: Interreflection, progress: Progress) -> list[Proposal]:
         """A proposal for each view."""

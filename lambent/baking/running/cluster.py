@@ -50,8 +50,7 @@ def opened(on: int | str) -> Iterator[DaskWorkers]:
         import distributed
     except ImportError as error:
         raise UserError("Dask is not installed", field="--on", hint="pip install 'lambent[cluster]'") from error
-    if isinstance(on, int) and on < 1:
-        raise UserError("no workers", field="--on", got=on, expected="at least 1, or the address of a scheduler")
+    check_count(on)
     warnings.filterwarnings("ignore", "Sending large graph")  # sending tiles with their jobs is intended
     with ExitStack() as stack:
         threads, address = None, str(on)
@@ -74,6 +73,12 @@ def opened(on: int | str) -> Iterator[DaskWorkers]:
             hint = "start a scheduler with `dask scheduler` and workers with `dask worker ADDRESS --nthreads 1`"
             raise UserError("no worker answered", field="--on", got=address, hint=hint) from error
         yield DaskWorkers(client, threads)
+
+
+def check_count(on: int | str) -> None:
+    """Raise `UserError` for fewer than one process."""
+    if isinstance(on, int) and on < 1:
+        raise UserError("no workers", field="--on", got=on, expected="at least 1, or the address of a scheduler")
 
 
 @contextmanager
