@@ -26,6 +26,7 @@ AGAIN_S = 0.02
 INTERRUPTION = "lambent: interrupted; finished work is kept\n"
 NO_ROOM = "failed to map segment"  # message of the ImportError if a library does not fit into memory
 MEMORY = "out of memory; close other programs, raise the limit (ulimit -v), or ask for less"
+LOST = "the graphics device was lost, as when its driver restarts; a window's edits are in its session: start again"
 FAULTS_OF_THE_DISK = {
     errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.ENOTDIR,
     errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.EIO,
@@ -103,6 +104,8 @@ def run(arguments: list[str]) -> int:
             code = INTERRUPTED
         elif isinstance(error, ModuleNotFoundError) and (said := missing(error)) is not None:
             return _fail(str(said))
+        elif _lost_device(error):
+            return _fail(LOST)
         elif isinstance(error, MemoryError) or (isinstance(error, ImportError) and NO_ROOM in str(error)):
             return _fail(MEMORY)
         else:
@@ -110,6 +113,15 @@ def run(arguments: list[str]) -> int:
     if code == INTERRUPTED:
         sys.stderr.write(INTERRUPTION)
     return int(code)
+
+
+def _lost_device(error: Exception) -> bool:
+    """Whether the graphics device is gone: its driver has restarted, or it was unplugged."""
+    if "wgpu" not in sys.modules:
+        return False
+    from lambent.realtime.gpu.device import is_lost
+
+    return is_lost(error)
 
 
 def _usage_fault(error: TyperException) -> str:

@@ -22,6 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, features
 
+from lambent.core.files import write_bytes
+
 LEVEL = 9
 PICTURE_QUALITY, AVIF_QUALITY = 90, 88
 OPAQUE = 255
@@ -89,7 +91,7 @@ class Chunks:
         content = made.getvalue()
         digest = hashlib.sha256(content).hexdigest()
         name = f"data/{digest[:20]}.{form}"
-        (self._folder.parent / name).write_bytes(content)
+        write_bytes(self._folder.parent / name, content)
         self.files[name] = size = len(content)
         return {"file": name, "bytes": size, "packed": size, "picture": True}
 
@@ -107,7 +109,7 @@ class Chunks:
             if len(packed) <= INLINE:
                 found["inline"] = base64.b64encode(packed).decode()
             else:
-                (self._folder.parent / name).write_bytes(packed)
+                write_bytes(self._folder.parent / name, packed)
                 self.files[name] = len(packed)
             self._added[name] = found if packing is None else {**found, "packing": packing.said()}
         return dict(self._added[name])

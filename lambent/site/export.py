@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from lambent.core.errors import UserError
-from lambent.core.files import write_text
+from lambent.core.files import atomic_path, write_bytes, write_text
 from lambent.core.inputs import read_head
 from lambent.core.light.exposure import metered
 from lambent.core.light.light_mix import MixTrack
@@ -155,11 +155,13 @@ def _write_poster(renderer: Renderer, state: FrameState, file: Path) -> None:
     from PIL import Image
 
     width, height = POSTER
-    Image.fromarray(renderer.still(replace(state, width=width, height=height))).save(file, quality=85)
+    picture = Image.fromarray(renderer.still(replace(state, width=width, height=height)))
+    with atomic_path(file) as temporary:
+        picture.save(temporary, quality=85)
 
 
 def _copy_page(folder: Path) -> None:
     with as_file(files("lambent.site").joinpath("page")) as page:
         for file in page.iterdir():
             if file.suffix in (".html", ".js", ".css"):
-                shutil.copyfile(file, folder / file.name)
+                write_bytes(folder / file.name, file.read_bytes())

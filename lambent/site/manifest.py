@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.core.files import write_bytes
 from lambent.realtime.gpu.commands import Commands, RenderPass
 from lambent.realtime.gpu.described import DescribedDevice, Made
 from lambent.realtime.gpu.pipelines import VERTEX_FLOATS
@@ -259,8 +260,7 @@ class Manifest:
     def _shader_module(self, made: Made) -> dict[str, Any]:
         code = made.descriptor["code"].encode()
         name = f"shaders/{hashlib.sha256(code).hexdigest()[:20]}.wgsl"
-        (self._folder / "shaders").mkdir(exist_ok=True)
-        (self._folder / name).write_bytes(code)
+        write_bytes(self._folder / name, code)
         return {"file": name}
 
     def _render_pipeline(self, made: Made) -> dict[str, Any]:

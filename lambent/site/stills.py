@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
-from lambent.core.files import write_text
+from lambent.core.files import atomic_path, write_bytes, write_text
 from lambent.core.light.exposure import ev100_of
 from lambent.core.plain import printable
 from lambent.core.progress import Progress, part_of, silent
@@ -117,7 +117,8 @@ def _write(picture: NDArray[np.uint8], file: Path, most_px: int | None = None) -
     image = Image.fromarray(picture)
     if most_px is not None:
         image.thumbnail((most_px, most_px))
-    image.save(file, "webp", quality=PICTURE_QUALITY)
+    with atomic_path(file) as temporary:
+        image.save(temporary, "webp", quality=PICTURE_QUALITY)
 
 
 def _thumbnail(view: int) -> str:
@@ -160,6 +161,6 @@ def _write_page(folder: Path, name: str, links: str, sections: str) -> None:
     with as_file(files("lambent.site").joinpath("stills_page")) as page:
         for file in page.iterdir():
             if file.suffix in (".js", ".css"):
-                shutil.copyfile(file, folder / file.name)
+                write_bytes(folder / file.name, file.read_bytes())
         template = Template((page / "index.html").read_text("utf-8"))
     write_text(folder / "index.html", template.substitute(name=_said(name), links=links, sections=sections))

@@ -26,7 +26,7 @@ import numpy as np
 from numcodecs import Zstd
 
 from lambent.core.errors import UserError
-from lambent.core.files import atomic_path, inside
+from lambent.core.files import inside, naming, write_bytes
 from lambent.core.inputs import read_bytes
 from lambent.store.artefact import Array, Artefact, Chunk, Region, Version, chunk_id
 
@@ -66,8 +66,7 @@ class ChunkFiles:
         files: dict[str, Any] = {}
         a, codec = self.artefact, ZstdCodec(level=_ZSTD.level)
         create_array(MemoryStore(files), shape=a.shape, chunks=a.chunks, dtype=a.dtype, compressors=codec)
-        with atomic_path(inside(self._folder, "zarr.json")) as beside:
-            beside.write_bytes(files["zarr.json"].to_bytes())
+        write_bytes(inside(self._folder, "zarr.json"), files["zarr.json"].to_bytes())
 
     def write(self, chunk: Chunk, data: Array) -> None:
         """Write a chunk to disk, then record it in the journal, then delete the replaced file."""
@@ -76,8 +75,7 @@ class ChunkFiles:
         version = Version(zlib.crc32(encoded), 0 if old is None else old.generation + 1)
         path = self._path(chunk, version)
         if encoded:
-            with atomic_path(path) as beside:
-                beside.write_bytes(encoded)
+            write_bytes(path, encoded)
         else:
             path.unlink(missing_ok=True)  # left by a process that died before recording it
         self._note(chunk_id(chunk), version.generation, version.crc)
@@ -144,7 +142,7 @@ class ChunkFiles:
 
     def _note(self, name: str, number: int, crc: int) -> None:
         """Append a line to the journal and flush it to disk."""
-        with self.journal.open("ab") as file:
+        with naming(self.journal), self.journal.open("ab") as file:
             file.write(f"\n{name} {number} {crc};".encode("ascii"))
             file.flush()
             os.fsync(file.fileno())

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from lambent.core.errors import UserError
-from lambent.core.files import atomic_path
+from lambent.core.files import write_bytes
 from lambent.core.glb import glb_bytes
 from lambent.core.pictures.images import write_image
 from lambent.store.contract import SIDES, scene_record, whole_objects
@@ -38,8 +38,7 @@ def write_light_map(store: Store, image: Path) -> None:
     if store.availability(name)[0] != "complete":
         raise UserError("has no light map", file=store.folder, hint="bake it: lambent bake SCENE -o STORE")
     write_image(image, store.read(name).astype(np.float32))
-    with atomic_path(meshes_beside(image)) as temporary:
-        temporary.write_bytes(_meshes(store))
+    write_bytes(meshes_beside(image), _meshes(store))
 
 
 def _meshes(store: Store) -> bytes:

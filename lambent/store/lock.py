@@ -71,8 +71,12 @@ class WriterLock:
             raise UserError(
                 "is locked by another writer", file=folder, got=who, expected="one writer at a time", hint=hint
             )
-        os.ftruncate(self._handle, 0)
-        os.write(self._handle, f"{self._process} {platform.node()}\n".encode())
+        try:
+            os.ftruncate(self._handle, 0)
+            os.write(self._handle, f"{self._process} {platform.node()}\n".encode())
+        except OSError as error:
+            self.release()
+            raise UserError(f"cannot be written ({error.strerror})", file=folder) from error
         _held[path] = self
 
     @property

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.files import atomic_path
+from lambent.core.files import write_bytes
 from lambent.core.geometry.directions import Floats, direction, normalize, reflect
 from lambent.core.light.colour import luminance
 from lambent.core.progress import Progress, silent, tracked
@@ -39,8 +39,7 @@ def write(subject: Subject, path: Path, progress: Progress = silent) -> Cost:
     """Write the file and return its losses."""
     scatterer = scatterer_of(subject)
     content = tensor_bytes(_tensors(scatterer, progress))
-    with atomic_path(Path(path)) as temporary:
-        temporary.write_bytes(content)
+    write_bytes(Path(path), content)
     return read_back(subject, Path(path), (LOST_TRANSMISSION,) if scatterer.transmits else ())
 
 

@@ -141,6 +141,11 @@ def open_device(needs: Mapping[str, int] | None = None) -> Any:
     return adapter.request_device_sync(required_limits=limits, required_features=features)
 
 
+def is_lost(error: BaseException) -> bool:
+    """Whether an error says that a device is gone; wgpu has no class for that."""
+    return isinstance(error, wgpu.GPUError) and "device is lost" in str(error)
+
+
 def open_room_device() -> Any:
     """A device that serves any room: with the adapter's own limits where rooms need more than is usual."""
     limits = choose_adapter().limits

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from lambent.core.ceilings import TEXTURE_BYTES
 from lambent.core.errors import UserError
-from lambent.core.files import atomic_path, inside
+from lambent.core.files import inside, write_bytes
 from lambent.core.inputs import read_bytes
 from lambent.core.plain import plain_name
 from lambent.scenes.looks.image_textures import mean_and_detail
@@ -36,8 +36,7 @@ def kept_image(folder: Path, file: Path) -> str:
     name = f"{plain_name(file.stem, 'image')}-{digest}{file.suffix.lower()}"
     copy = folder / IMAGES / name
     if not copy.exists():
-        with atomic_path(copy) as beside:
-            beside.write_bytes(content)
+        write_bytes(copy, content)
     return name
 
 

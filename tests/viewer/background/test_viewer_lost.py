@@ -1,6 +1,7 @@
 """What is kept when the window is lost."""
 
 import errno
+import os
 import shutil
 import signal
 import subprocess
@@ -141,3 +142,32 @@ def test_a_walk_that_can_be_kept_nowhere_is_said(mode, state, capsys, monkeypatc
     said = capsys.readouterr().err
     assert said.startswith("lambent: note: the recorded walk could not be saved: ") and said.count("\n") == 1
     assert "walk 1-rescued-001.json: cannot be written (Permission denied)" in said
+
+
+LOSES_ITS_DEVICE = """
+import sys
+from lambent.cli import main
+from lambent.viewer.modes.walk.mode import WalkMode
+advance, frames = WalkMode.advance, []
+def lost(mode, dt_s):
+    advance(mode, dt_s)
+    frames.append(dt_s)
+    if len(frames) == 3:
+        edits = mode.state.materials.edits
+        edits.change("brass", edits.current("brass").model_copy(update={"kd": (0.3, 0.3, 0.3)}))
+        mode.drawing.device.destroy()
+WalkMode.advance, WalkMode.moving = lost, property(lambda mode: True)
+sys.exit(main.run(["walk", sys.argv[1]]))
+"""
+
+
+@pytest.mark.slow
+def test_a_lost_device_keeps_the_session(virtual_screen, tmp_path):
+    store = write_small_store(tmp_path / "small")
+    environment = {**os.environ, "DISPLAY": virtual_screen.name}
+    environment.pop("WAYLAND_DISPLAY", None)
+    command = [sys.executable, "-c", LOSES_ITS_DEVICE, str(store)]
+    done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=600)
+    *_, error = done.stderr.splitlines()
+    assert done.returncode == 2 and error.startswith("lambent: error: the graphics device was lost"), done.stderr
+    assert "Traceback" not in done.stderr and read_session(store / FILE).now.materials["brass"].kd == (0.3, 0.3, 0.3)
