@@ -48,10 +48,11 @@ def run(
     if hasattr(module, "check"):
         module.check(Path(path), **options)
     check_display(module.NO_DISPLAY)
-    opened = module.start(Path(path), mode, Screen(folder or Path.cwd()), **options)
     from lambent.viewer.window import Window
 
-    window = Window(opened, size=size, frames=frames)
+    # The window alone holds the mode: it may be exchanged, and its renderer is then to be freed.
+    screen = Screen(folder or Path.cwd())
+    window = Window(module.start(Path(path), mode, screen, **options), size=size, frames=frames)
     with kept(lambda: window.mode.rescue()):  # the mode may be exchanged
         try:
             window.run()

@@ -5,6 +5,7 @@ Importing this needs a display.
 
 from __future__ import annotations
 
+import gc
 import signal
 from collections.abc import Sequence
 from typing import Any
@@ -96,6 +97,7 @@ class Window(Frames):
         super()._advance(since_last_s)
         if (enter := self.screen.enter) is not None:
             self.screen.enter, self.mode = None, enter(self.mode)
+            gc.collect()  # a mode lies in cycles, and its renderer holds textures that Python's counts do not see
         if self.screen.close_wanted or self.screen.closes:
             self._want_close()
         self._imgui.backend.io.delta_time = min(max(since_last_s, 1e-4), 1.0)

@@ -129,7 +129,8 @@ def whole_site(folder: Path) -> None:
     manifest = json.loads(path.read_text()) if path.exists() else {}
     for kind in ("buffer", "texture"):
         for one in manifest.get("tables", {}).get(kind, ()):
-            assert "data" not in one or (folder / "out" / one["data"]["file"]).is_file(), one["data"]["file"]
+            data = one.get("data", {"inline": ""})
+            assert "inline" in data or (folder / "out" / data["file"]).is_file(), data["file"]
 
 
 def nothing(folder: Path) -> None:

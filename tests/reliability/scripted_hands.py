@@ -25,7 +25,7 @@ WALKING = ("w", "a", "s", "d", "ArrowUp", "ArrowLeft", "ArrowDown", "ArrowRight"
 SIZES = ((480, 360), (640, 480), (900, 600), (1100, 800))
 MOST_KEPT = 8  # views, walks, states
 PATIENCE_S = 600.0  # for the first bake of a view, a written session, another mode
-REBAKE_S = 120.0
+REBAKE_S, RELIT_S = 60.0, 10.0
 REST_S = (1.0, 8.0)
 Frames = Iterator[None]
 
@@ -282,9 +282,9 @@ class Hands:
         if not isinstance(self._mode, RelightMode):
             return
         state = self._mode.state
-        yield from self._until(lambda: state.is_current and not state.busy)
+        yield from self._until(lambda: state.is_current and not state.busy, RELIT_S)  # edits are baked anew each time
         yield from self._drag(self._place(), self._place())
-        yield from self._until(lambda: not state.busy)
+        yield from self._until(lambda: not state.busy, RELIT_S)
         yield from self._back()
 
     def _left(self, leave: Callable[[Any], None], mode: type) -> Frames:
