@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import product
@@ -10,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lambent.core.files import atomic_path
+from lambent.core.files import write_bytes
 from lambent.core.geometry.directions import Floats, direction
 from lambent.core.outputs import MARK
 from lambent.materials.fitting.shown.incidence import Incidence, incidences, measured_disk
@@ -125,8 +126,9 @@ def draw_disk(axis: Any, image: Floats, theta_deg: float, limit: float = 1.1) ->
 def save_figure(figure: Any, path: Path, dpi: int = 120) -> None:
     """Write a figure, atomically, in the format of the suffix: .png, .pdf or .svg."""
     made_by = "Software" if path.suffix.lower() == ".png" else "Creator"
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=dpi, metadata={made_by: MARK})
+    drawn = io.BytesIO()  # a PDF's writer hides the error of a full disk behind one of its own
+    figure.savefig(drawn, dpi=dpi, format=path.suffix.lower().removeprefix("."), metadata={made_by: MARK})
+    write_bytes(path, drawn.getvalue())
 
 
 def _draw_plane(figure: Any, evaluate: Eval, name: str, transmits: bool) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from lambent.core.arrays import Floats
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
-from lambent.core.files import atomic_path, write_text
+from lambent.core.files import write_bytes, write_text
 from lambent.core.light.false_colour import STOPS, fitting_range, number
 from lambent.core.outputs import MARK
 from lambent.core.plain import printable
@@ -96,7 +96,8 @@ def write_pages(path: Path, results: Sequence[Illuminated], store: Store, note: 
 
     baked = datetime.fromtimestamp((store.folder / MANIFEST).stat().st_mtime)
     title = printable(f"{scene_record(store).name} ({store.folder.name}), baked {baked:%Y-%m-%d %H:%M}")
-    with atomic_path(path) as temporary, PdfPages(temporary, metadata={"Creator": MARK}) as pages:
+    drawn = io.BytesIO()  # a PDF's writer hides the error of a full disk behind one of its own
+    with PdfPages(drawn, metadata={"Creator": MARK}) as pages:
         for one in results:
             figure, grid = new_figure(*A4_INCHES), one.grid
             plan, beside = figure.subplots(1, 2, width_ratios=(3, 1))
@@ -109,6 +110,7 @@ def write_pages(path: Path, results: Sequence[Illuminated], store: Store, note: 
             beside.text(0, 1, "\n\n".join([*lines, note]), va="top", fontsize=9, parse_math=False, wrap=True)
             beside.axis("off")
             pages.savefig(figure)
+    write_bytes(path, drawn.getvalue())
 
 
 def _draw_plan(figure: Any, axis: Any, one: Illuminated) -> None:
