@@ -20,12 +20,12 @@ SHARED = Path(os.environ.get("LAMBENT_SHARED", Path(__file__).parents[2] / "shar
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--long", action="store_true", help="Run tests that take minutes, too.")
+    parser.addoption("--long", action="store_true", help="Run tests that take more than two seconds, too.")
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
     if item.get_closest_marker("long") and not item.config.getoption("--long"):
-        pytest.skip("takes minutes with its like: pytest --long runs them")
+        pytest.skip("pytest --long runs it")
 
 
 @pytest.fixture(scope="session", autouse=True)

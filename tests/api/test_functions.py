@@ -17,6 +17,7 @@ from lambent.store.kept.session import FILE, RoomState, WalkSession, write_sessi
 BRIGHT = Document(name="bright", kd=0.9, lobes=(Lobe(mx=0.1, my=0.1, r0=0.9),))
 
 
+@pytest.mark.long
 def test_materials_files_and_models_are_checked(tmp_path):
     found = lambent.check(lambent.Material(BRIGHT))
     assert not found.passed and "grow without bound" in found.failures[0]
@@ -46,6 +47,7 @@ def test_a_material_is_written_in_another_format(tmp_path):
         lambent.convert(tmp_path, tmp_path / "any.bsdf", as_="rgl")
 
 
+@pytest.mark.long
 def test_glare_of_a_view_in_a_store(adapter, baked_box):
     found = lambent.glare(baked_box, "front", integrator="lamps", threshold_cd_m2=100)
     marked = found.marked()
@@ -56,6 +58,7 @@ def test_glare_of_a_view_in_a_store(adapter, baked_box):
         lambent.glare(baked_box / "manifest.json", "front")
 
 
+@pytest.mark.long
 def test_a_room_as_its_window_left_it(adapter, baked_box, tmp_path):
     folder = tmp_path / "box.store"
     shutil.copytree(baked_box, folder)

@@ -40,6 +40,7 @@ def base(tmp_path):
     return run
 
 
+@pytest.mark.long
 def test_the_base_fits_converts_and_checks(base, tmp_path):
     table = write_measurement(tmp_path / "brass.txt", BRASS)
     for words in (
@@ -100,7 +101,7 @@ def test_the_container_installs_what_the_doctor_asks_for():
     assert {*copied} == kept and all((ROOT / name).exists() for name in copied)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_wheel_works_outside_of_the_checkout(mi, tmp_path):
     pip, source = [sys.executable, "-m", "pip", "--disable-pip-version-check", "-q"], tmp_path / "source"
     for folder in ("lambent", "integrations"):

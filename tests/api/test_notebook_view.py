@@ -29,6 +29,7 @@ def run(adapter, baked_box):
     return lambda *cells: executed(OPEN.format(folder=str(baked_box)), *cells)[-1]
 
 
+@pytest.mark.long
 def test_without_a_browser_the_cell_has_a_picture(adapter, baked_box):
     (shown,) = executed(f"import lambent; lambent.open({str(baked_box)!r}).view('front', size=(96, 64))")
     assert "application/vnd.jupyter.widget-view+json" in shown
@@ -37,6 +38,7 @@ def test_without_a_browser_the_cell_has_a_picture(adapter, baked_box):
     assert shown["text/plain"] == "View('box', 'front')"
 
 
+@pytest.mark.long
 def test_a_drag_looks_keys_walk_the_wheel_steps(run):
     shown = run(
         """
@@ -53,6 +55,7 @@ await end.after(lambda: end.say("wheel", x=80, y=60, dx=0, dy=100))
     assert shown["text/plain"] == "(True, True, True, True)"
 
 
+@pytest.mark.long
 def test_controls_change_the_picture_and_keys_take_it_back(run):
     shown = run(
         """
@@ -73,6 +76,7 @@ said
     assert shown["text/plain"] == "[True, True, True, True]"
 
 
+@pytest.mark.long
 def test_it_converges_at_rest_and_the_picture_is_the_one_shown(run, mi):
     shown = run(
         """
@@ -84,6 +88,7 @@ picture.radiance.shape, bool(abs(picture.shown.astype(int) - end.picture).mean()
     assert shown["text/plain"] == "((120, 160, 3), True)"
 
 
+@pytest.mark.long
 def test_two_views_and_closed_ones(run, mi):
     shown = run(
         """
@@ -109,6 +114,7 @@ repr(view), after < before, len(children()) < after, moved.std() > 0
     assert shown["text/plain"] == "(\"View('box', closed)\", True, True, np.True_)"
 
 
+@pytest.mark.long
 def test_without_an_adapter_it_says_so(baked_box):
     shown = executed(
         f"""

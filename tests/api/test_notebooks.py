@@ -50,7 +50,7 @@ def test_a_notebook_uses_what_is_public(file):
     assert "lambent" in imported and not private
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
 def test_a_notebook_runs(file, folder, adapter, mi):
     notebook = nbformat.read(file, 4)

@@ -146,6 +146,7 @@ def table(tmp_path_factory):
     return lambent.read(write_measurement(tmp_path_factory.mktemp("brass") / "brass.txt", BRASS))
 
 
+@pytest.mark.long
 def test_a_table_is_fitted_and_its_material_is_a_bsdf(table, tmp_path):
     assert isinstance(table, lambent.Table) and "isotropic" in repr(table) and "brass.txt" in repr(table)
     said = []
@@ -196,6 +197,7 @@ def test_pictures_compare_as_arrays_and_as_files(tmp_path):
     assert not shown.is_radiance and np.abs(shown.shown.astype(int) - one.shown).max() <= 1
 
 
+@pytest.mark.long
 def test_a_store_is_rendered_with_edits(adapter, baked_box, tmp_path):
     from lambent.render import Settings, still
 
@@ -218,6 +220,7 @@ def test_a_store_is_rendered_with_edits(adapter, baked_box, tmp_path):
             store.render(**{"size": (8, 8), **wrong})
 
 
+@pytest.mark.long
 def test_a_scene_is_baked_and_illuminance_traced(tmp_path):
     store = lambent.bake("builtin:box", tmp_path / "box.store", only={"light_map"}, progress=False)
     assert isinstance(store, lambent.Store) and store.folder == tmp_path / "box.store"

@@ -31,7 +31,7 @@ def test_a_curve_is_pulled_at_one_node():
             METAL.with_curve(title, wrong)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_bench_runs_at_other_sizes(adapter):
     report = lambent.run_bench("walk-cube", quick=True, width=64, height=48, ns=(3,), rounds=1)
     assert {row["width"] for row in report["rows"]} == {64} and report["machine"]["cores"] > 0

@@ -28,6 +28,7 @@ def irradiance(cube: np.ndarray, normal: np.ndarray) -> np.ndarray:
     return (cube.astype(float) * (cosine * texel_solid_angles(n))[..., None]).sum(axis=(0, 1, 2))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("radius_deg", [0.2679, 4.0])
 def test_sky_and_sun_carry_the_path_tracers_energy(tmp_path: Path, radius_deg: float) -> None:
     sky = SunSky(tuple(SUN), sun_radius_deg=radius_deg)

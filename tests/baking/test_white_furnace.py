@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from lambent.baking.interreflection.settings import Bounces
 from lambent.baking.quality import quality_named
@@ -23,6 +24,7 @@ INSIDE = Camera("inside", (0.3, 0.2, 0.4), (-0.5, -0.3, -1.0), fov_y_deg=60.0)
 POLISHED = Material(kd=0.9, kd_coupled=True, lobes=(Lobe(mx=0.01, my=0.01, r0=0.1, alpha=0.5),))
 
 
+@pytest.mark.long
 def test_a_closed_white_furnace_stays_white(tmp_path: Path) -> None:
     """Walls that shine with 1 and reflect all: each further surface adds 1, to 1e-3 in the mean of them.
 

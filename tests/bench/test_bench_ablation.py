@@ -70,6 +70,7 @@ def test_switches_are_of_what_there_is() -> None:
             pass
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("adapter")
 def test_rows_say_what_changes(coarse_box):
     noisy = Switch("lambent.traced.picture.ENDED", 0, TRACE)

@@ -16,6 +16,7 @@ from lambent.store.store import Store
 from lambent.traced.room import TracedRoom
 
 
+@pytest.mark.long
 def test_pictures_at_rest_come_below_path_tracing(coarse_box: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ticks = itertools.count()  # a second for each step
     monkeypatch.setattr(accumulate, "time", SimpleNamespace(process_time=lambda: float(next(ticks))))
@@ -30,6 +31,7 @@ def test_pictures_at_rest_come_below_path_tracing(coarse_box: Path, monkeypatch:
     assert report["summary"]["box.store"] == {key: last[key] for key in ("flip", "bar", "flip_worst_tile")}
 
 
+@pytest.mark.long
 def test_edits_of_all_kinds_show(coarse_box: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     effort = replace(edits.QUICK, width=96, height=64, samples=32, truth_spp=256)
     report = edits.run(effort, inputs=[coarse_box])

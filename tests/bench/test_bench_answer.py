@@ -27,6 +27,7 @@ SMALL = quality_named("preview").changed(
 EFFORT = answer.Effort(texels=60, paths=128, edits=2, turns=1, contact_paths=512, drag_s=0.5)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("adapter", "mi")
 def test_rows_of_a_store(tmp_path: Path) -> None:
     lamp = '[[lights]]\nkind = "point"\nname = "bulb"\nposition = [0.3, 0.3, 0.3]\nintensity = [0.2, 0.1, 0.05]\n'
@@ -52,6 +53,7 @@ def test_rows_of_a_store(tmp_path: Path) -> None:
             assert row["p95_contacts_noise"] > 0 and row["relative_rms_contacts"] <= 2 * row["p95_contacts"]
 
 
+@pytest.mark.long
 def test_edits_of_a_scene_are_of_its_largest_materials() -> None:
     scene = load_scene("builtin:box")
     edits = answer.edits_of(scene, 4)

@@ -46,7 +46,7 @@ def test_rows_are_found_in_order_and_fit_into_the_budget() -> None:
     assert len({one.turn for one in rows.values()}) == len(rows)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_run_that_is_killed_keeps_its_figures(two_rows: None, tmp_path: Path) -> None:
     file = tmp_path / "card.json"
     with subprocess.Popen([sys.executable, "-c", RUN, str(file)], stdout=subprocess.PIPE, text=True) as run:
@@ -99,6 +99,7 @@ def test_other_files_stay(two_rows: None, content: str, tmp_path: Path) -> None:
     assert file.read_text() == content
 
 
+@pytest.mark.long
 def test_reasons_are_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(process.Failed, match="ended with code 1 KeyError: 'no such row'"):
         list(process.figures("no such row", row.Row(lambda effort, work: iter(()), 1, 0, OWN), TINY, tmp_path, 600))

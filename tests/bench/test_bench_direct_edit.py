@@ -17,6 +17,7 @@ from lambent.materials.factored.of_models import same_quotients
 SMALL = Effort(48, (60,), frames=4, edits=10, reference_spp=64, rival_s=0.5, checked=4)
 
 
+@pytest.mark.long
 def test_rows_of_a_scene_and_of_the_full_frame(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(direct_edit, "CASES", {"builtin:teatray": CASES["builtin:teatray"]})
     report = run(SMALL)
@@ -37,6 +38,7 @@ def test_rows_of_a_scene_and_of_the_full_frame(monkeypatch: pytest.MonkeyPatch) 
     json.dumps(report)
 
 
+@pytest.mark.long
 def test_the_rival_comes_closer_with_more_samples() -> None:
     from lambent.baking.engine import engine
 

@@ -18,6 +18,7 @@ from lambent.store.store import Store
 pytestmark = pytest.mark.usefixtures("adapter")
 
 
+@pytest.mark.long
 def test_rows_name_the_rival_of_equal_time(coarse_box):
     effort = replace(equal_time.QUICK, width=96, height=64, truth_spp=32, runs=1, samples=(1, 64))
     report = equal_time.run(effort, inputs=[coarse_box])
@@ -50,6 +51,7 @@ def test_times_of_equal_error_are_interpolated():
     assert equal == {"flip": 0.07, "traced": pytest.approx(2**0.5, abs=1e-3), "path": 8.0, "ratio": 0.177}
 
 
+@pytest.mark.long
 def test_finished_references_are_the_truth_of_rows_of_their_size(coarse_box, tmp_path):
     effort = replace(equal_time.QUICK, width=96, height=64, runs=1, samples=(1,))
     files = []

@@ -16,7 +16,7 @@ from tests.materials.fitting.known_answers import FEW, PAINT
 WARD = "paint = Aggregate(Lambertian(albedo = [.2, .2, .2]), NganWard(albedo = [.04, .03, .02], roughness = .15))\n"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_known_answers_are_found():
     report = run(replace(QUICK, known=(KNOWN["white foil"],), below_zero=False, tapes=()))
     names = [p["parameter"] for p in report["rows"][0]["parameters"]]
@@ -26,7 +26,7 @@ def test_known_answers_are_found():
     json.dumps(report)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_readings_below_zero_leave_the_albedo():
     report = run(replace(QUICK, known=(), tapes=()))
     assert {row["file"].split(", ")[1] for row in report["rows"]} == {"clean", "blue lowered", "noise"}
@@ -37,7 +37,7 @@ def test_readings_below_zero_leave_the_albedo():
     json.dumps(report)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_callers_file_is_fitted_and_held_against_what_was_published(tmp_path):
     path, published = tmp_path / "paint.txt", tmp_path / "ward.fit"
     write_gonio(path, synthesise(PAINT, replace(FEW, step_deg=10.0, fine_deg=4.0)))

@@ -57,6 +57,7 @@ def test_what_was_hidden_is_not_taken_from_what_hid_it() -> None:
     assert 0.01 < (without & ~seen).mean() < 0.2
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("adapter")
 def test_bench_sees_what_flickers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     coarse = quality_named("preview").changed("coarse", geometry={"texels": 64}, environment={"texels": 32})

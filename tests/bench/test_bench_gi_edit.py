@@ -16,7 +16,7 @@ from lambent.materials.factored.of_models import same_quotients
 SMALL = replace(QUICK, shrink=10, frames=2, edge=16, cases=CASES[-1:], series=((64, 1), (16, 8)))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_rows_of_a_scene_and_of_its_series() -> None:
     report = run(SMALL)
     row, *compared = report["rows"]

@@ -37,6 +37,7 @@ def test_maps_hold_what_the_traced_rays_meet(view: LightFieldView) -> None:
     assert len(black) and not field.radiance[black].any() and field.radiance[used].any(axis=(1, 2, 3)).all()
 
 
+@pytest.mark.long
 def test_a_diffuse_object_is_seen_by_its_own_light_field(view: LightFieldView, tmp_path: Path) -> None:
     folder = tmp_path / "store"
     block = LightFieldView(load_scene("builtin:box"), "block", 0, (96, 96), 1, folder, oslf.SMALL)
@@ -57,6 +58,7 @@ def test_errors_are_those_of_the_object_alone() -> None:
     assert off["flip"] > 0.01 and min(off["rmse_rgb"]) > 0.01
 
 
+@pytest.mark.long
 def test_the_whole_run_is_json(mi: Any) -> None:
     report = oslf.run(replace(oslf.QUICK, size=(48, 48), paths=1))
     assert json.loads(json.dumps(report))["summary"]["64 x 32"]["march 4"][0] < 1

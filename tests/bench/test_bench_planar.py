@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from lambent.bench.pictures import planar_quality
 from lambent.bench.scenes import planar_scene
@@ -14,6 +15,7 @@ from lambent.realtime.gpu.device import open_device
 from lambent.realtime.renderer import Renderer
 
 
+@pytest.mark.long
 def test_ray_casting_and_a_sharp_mirror_agree() -> None:
     """Two independent methods give the same image: ray casting on the CPU, the reflection buffer on the GPU."""
     lobe = planar_quality.lobe_of(0.001, 0.001)
@@ -27,6 +29,7 @@ def test_ray_casting_and_a_sharp_mirror_agree() -> None:
     assert np.median(np.abs(reference - test)[floor]) < 0.01
 
 
+@pytest.mark.long
 def test_interleaving_beats_the_thesis_and_the_probe() -> None:
     """At n = 7 it is 8 dB at full size; here a tile of 8 x 8 pixels is much of the image."""
     effort = planar_quality.Effort(160, 120, 64, ns=(7,), roughnesses=((0.05, 0.05), (0.1, 0.1)))

@@ -32,6 +32,7 @@ def check_form(report: dict) -> None:
     json.dumps(report, allow_nan=False)
 
 
+@pytest.mark.long
 def test_rings_stand_above_the_published_estimates(tmp_path: Path) -> None:
     """At n = 7: 3 dB above fis and 4 dB above lobe-4.25 in the mean, as the spec's experiment has it."""
     picture = np.full((16, 32, 3), 0.1, np.float32)
@@ -50,6 +51,7 @@ def test_rings_stand_above_the_published_estimates(tmp_path: Path) -> None:
     assert all(0 < row["flip_qmc"] < row["flip_qmc_worst_tile"] < 1 for row in report["rows"])
 
 
+@pytest.mark.long
 def test_the_callers_materials_stand_beside_ours(tmp_path: Path) -> None:
     """A document and a measured table are told from environments by their content, and only their lobes are shown."""
     lobe = Lobe(mx=0.2, my=0.2, r0=0.7)
@@ -67,6 +69,7 @@ def test_the_callers_materials_stand_beside_ours(tmp_path: Path) -> None:
     assert {row["material"] for row in report["rows"]} == {"matte .15", "mine"}
 
 
+@pytest.mark.long
 def test_the_path_tracer_sees_the_same_image() -> None:
     """A lone sphere has nothing to reflect but the environment: qmc and path tracing agree, the right way round."""
     from lambent.bench.scenes.specular_scene import path_traced
@@ -81,6 +84,7 @@ def test_the_path_tracer_sees_the_same_image() -> None:
     assert np.abs(image - truth).mean() < 0.1 * np.abs(image[:, ::-1] - truth).mean()
 
 
+@pytest.mark.long
 def test_frame_times_come_with_their_spread() -> None:
     report = run_bench("walk-cube", walk_cube.Effort(40, 25, ns=(3, 7), rounds=2))
     check_form(report)

@@ -14,6 +14,7 @@ from lambent.bench.scenes.visibility_scenes import CASES
 SIZE, LIGHTS = 33, 50
 
 
+@pytest.mark.long
 def test_rows_are_counted_by_hand(mi: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Rays are counted where they are traced; the truth is asked of Mitsuba's scene itself, ray by ray."""
     from lambent.baking.tracing.scene_builder import SceneBuilder

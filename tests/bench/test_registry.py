@@ -83,6 +83,7 @@ def test_time_and_memory_of_a_process():
         load.timed([sys.executable, "-c", "raise SystemExit(3)"])
 
 
+@pytest.mark.long
 def test_load_counts_time_memory_and_what_the_gpu_holds(adapter, monkeypatch, tmp_path):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)

@@ -96,6 +96,7 @@ def test_compare(lambent, pictures, tmp_path):
     assert "inf dB" in lambent("compare", pictures[0], pictures[0]).out
 
 
+@pytest.mark.long
 def test_check_passes_and_fails_by_exit_code(lambent, material):
     good = lambent("check", material, "--json")
     assert good.code == 0 and good.json["passed"]
@@ -104,6 +105,7 @@ def test_check_passes_and_fails_by_exit_code(lambent, material):
     assert bad.code == 1 and "failed" in bad.out
 
 
+@pytest.mark.long
 def test_inspect_material_and_plot(lambent, material, tmp_path):
     facts = lambent("inspect", material, "--plot", tmp_path / "p.png", "--json").json
     assert facts["is"] == "material" and facts["lobe 1"]["my"] == 0.2
@@ -161,6 +163,7 @@ def test_a_disk_that_takes_no_file_is_one_line(lambent, monkeypatch, pictures, t
     assert (outcome.code, outcome.err) == (2, f"lambent: error: {said}\n")
 
 
+@pytest.mark.long
 def test_a_reader_that_leaves_is_no_error():
     """`lambent ... | head -1`"""
     process = subprocess.Popen(

@@ -76,6 +76,7 @@ def test_files_that_pages_name_exist(page):
     assert not [name for name in named if not any((root / name).exists() for root in (ROOT, ROOT / "lambent"))]
 
 
+@pytest.mark.long
 def test_the_picture_of_the_packages_shows_their_imports():
     """If not: .venv/bin/python docs/data_flow.py"""
     spec = importlib.util.spec_from_file_location("data_flow", ROOT / "docs/data_flow.py")

@@ -62,7 +62,7 @@ def run_of(page: Path) -> list[Block]:
     return [block for block in blocks_of(page) if block.note != "not run" and block.language not in SHOWN]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("page", [page for page in PAGES if run_of(page)], ids=lambda page: page.stem)
 def test_what_the_page_says_works(page, reader, coarse, lambent, tmp_path, monkeypatch):
     folder = tmp_path / "folder"

@@ -57,6 +57,7 @@ def words_of(pdf: Path) -> str:
     return re.sub(r"\\(.)", r"\1", "\n".join("".join(one) for one in pieces))
 
 
+@pytest.mark.long
 def test_a_table_has_every_point_with_the_light_of_the_lamp(lambent, store, tmp_path):
     file = tmp_path / "a.csv"
     outcome = lambent("illuminance", store, "-o", file, "--grid", "plane", "--json")
@@ -78,6 +79,7 @@ def test_a_table_has_every_point_with_the_light_of_the_lamp(lambent, store, tmp_
     assert "exists already" in lambent("illuminance", store, "-o", file).err, "a table is not replaced unasked"
 
 
+@pytest.mark.long
 def test_each_state_of_the_light_has_a_page(lambent, store, tmp_path):
     file, table = tmp_path / "a.pdf", tmp_path / "a.csv"
     common = ("illuminance", store, "--variant", "evening", "--maintenance", "0.8")
@@ -99,6 +101,7 @@ def test_each_state_of_the_light_has_a_page(lambent, store, tmp_path):
     assert lambent(*common, "-o", file).code == 0, "pages are Lambent's own"
 
 
+@pytest.mark.long
 def test_a_grid_over_an_object_in_a_mix(lambent, store, tmp_path):
     common = ("illuminance", store, "--object", "flo*", "--json")
     whole = lambent(*common).json["results"][0]
@@ -133,6 +136,7 @@ def test_what_is_refused(refused, store, options, words):
     assert words in refused("illuminance", store, *options)
 
 
+@pytest.mark.long
 def test_a_grid_added_after_the_bake_needs_no_other(lambent, tmp_path):
     scene, store = write_hall(tmp_path, SCENE.split("[[grids]]")[0]), tmp_path / "a.store"
     common = ("bake", scene, "-o", store, "--quality", "preview", "--only", "light_map")
@@ -144,6 +148,7 @@ def test_a_grid_added_after_the_bake_needs_no_other(lambent, tmp_path):
     assert lambent(*common).code == 0 and {one.name: one.key for one in Store.open(store).artefacts()} == keys
 
 
+@pytest.mark.long
 def test_a_store_that_cannot_be_traced_says_why(refused, lambent, tmp_path):
     scene = load_scene(str(write_hall(tmp_path, "")))
     bare = bake(scene, tmp_path / "a.store", quality=TINY, only=("geometry",)).folder

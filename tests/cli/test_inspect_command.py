@@ -32,6 +32,7 @@ def test_faults_are_sentences_below_the_facts(lambent, bright):
     assert lambent("inspect", bright, "--json").json["faults"]["energy_above_one"] is True
 
 
+@pytest.mark.long
 def test_the_picture_shows_curves_and_disks(lambent, bright, tmp_path):
     """Curves above, disks below; in the disks the source is a dot and what was not measured is blue."""
     assert lambent("inspect", bright, "--plot", tmp_path / "a.png").code == 0

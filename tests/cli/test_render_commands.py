@@ -35,6 +35,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_small_store(tmp_path_factory.mktemp("cli") / "small.store")
 
 
+@pytest.mark.long
 def test_still_in_every_format(lambent, store, tmp_path):
     shown = {}
     for suffix in ("png", "exr", "hdr"):
@@ -113,6 +114,7 @@ def lit(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("adapter", "mi")
 def test_colours_and_a_mix_go_together(lambent: Command, lit: Path, tmp_path: Path) -> None:
     pictures = {}
@@ -129,6 +131,7 @@ def test_colours_and_a_mix_go_together(lambent: Command, lit: Path, tmp_path: Pa
     assert mean["red"][1] < 0.4 * mean["plain"][1], "green is lost on walls, and again on what walls light"
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("adapter", "mi")
 def test_an_image_is_a_texture_and_the_light_follows(lambent: Command, lit: Path, tmp_path: Path) -> None:
     """One red image on all walls lights the room as red paint does; halves are seen as such."""
@@ -148,6 +151,7 @@ def test_an_image_is_a_texture_and_the_light_follows(lambent: Command, lit: Path
     assert bright > 10 * dark
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("adapter", "mi")
 def test_a_variant_a_sheet_and_a_film(lambent: Command, lit: Path, tmp_path: Path) -> None:
     assert lambent("render", lit, "--variant", "blue", "-o", tmp_path / "blue.png", *SMALL).code == 0
@@ -197,6 +201,7 @@ def test_what_a_store_lacks_is_said(refused: Command, lit: Path, tmp_path: Path)
     assert "none.toml" in refused("render", lit, "-o", tmp_path / "a-#.png", *SMALL, *missing)
 
 
+@pytest.mark.long
 def test_an_error_names_the_command_that_bakes_what_is_missing(lambent, refused, tmp_path):
     scene, store, picture = write_floor(tmp_path), tmp_path / "a store", tmp_path / "a.exr"
 
@@ -237,6 +242,7 @@ def test_an_error_names_the_command_that_bakes_what_is_missing(lambent, refused,
 BOUNCED = "--only", "interreflection", "--view", "above:12x8", "--series", "4,1", "--samples", "4"
 
 
+@pytest.mark.long
 def test_what_a_session_changed_is_proposed_for_edits(lambent, tmp_path):
     """Chrome, which hardly anybody sees, is fixed until a session changes it."""
     loaded, file = load_scene(str(write_floor(tmp_path))), tmp_path / "chrome.edits.json"
@@ -249,6 +255,7 @@ def test_what_a_session_changed_is_proposed_for_edits(lambent, tmp_path):
         assert asked.code == 0 and asked.json["proposals"][0]["bounces"]["fixed"] == fixed, asked
 
 
+@pytest.mark.long
 def test_interreflections_are_proposed_and_baked_as_the_user_wants(lambent, tmp_path):
     scene = write_floor(tmp_path)
     asked = lambent("bake", scene, "--view", "above:12x8", "--series", "4,1", "--samples", "4", "--propose")

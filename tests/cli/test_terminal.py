@@ -55,6 +55,7 @@ def test_names_do_not_command_the_terminal(lambent, refused, tmp_path, caplog):
     assert not any(set(text) & set("\x1b\x07\r\u202e") for text in said)
 
 
+@pytest.mark.long
 @posix
 def test_file_names_that_are_no_text(lambent, material, tmp_path):
     file = os.fsdecode(os.fsencode(tmp_path) + b"/\xff\x1b.json")
@@ -91,6 +92,7 @@ def test_long_errors_are_cut_and_their_hints_are_not():
     assert "more digits" in str(UserError("a", got=10**5000))
 
 
+@pytest.mark.long
 def test_what_exists_is_replaced_by_force_alone(lambent, refused, material, tmp_path):
     before = material.read_bytes()
     (tmp_path / "mine").write_text("mine")
@@ -209,6 +211,7 @@ def test_an_error_of_memory_is_one_line(refused, monkeypatch, tmp_path: Path, er
     assert "out of memory" in refused("inspect", tmp_path / "a.png")
 
 
+@pytest.mark.long
 def test_a_picture_larger_than_the_memory(tmp_path: Path) -> None:
     """800 MB of pixels in a process that may have 900 MB."""
     Image.new("L", (8192, 8192)).save(tmp_path / "a.png")

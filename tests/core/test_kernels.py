@@ -68,6 +68,7 @@ def run(program: str, layer: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", program], env=settings, capture_output=True, text=True)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("layer", ["workqueue", "default"])
 def test_four_threads_at_once_compute_the_bits_of_one_after_the_other(layer: str) -> None:
     ended = run(FOUR_THREADS, layer)
@@ -80,6 +81,7 @@ def test_a_forked_process_does_not_wait_for_a_thread_that_it_lacks() -> None:
     assert run(FORK, "workqueue").returncode == 0
 
 
+@pytest.mark.long
 def test_checked_bounds_stop_parallel_loops(tmp_path: Path) -> None:
     settings = os.environ | {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
     program = "import numpy as np\nfrom lambent.core.pictures.half import put_sums\n" + (

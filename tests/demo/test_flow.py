@@ -38,6 +38,7 @@ TINY = Effort(
 )
 
 
+@pytest.mark.long
 def test_the_film_walks_at_a_persons_pace() -> None:
     (path,) = load_scene("builtin:room").paths
     eyes = np.array([camera.position for camera in walked(path, 20)])
@@ -68,7 +69,7 @@ class Interrupt:
             raise Cancelled
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_flow_ends_with_everything_it_names(tmp_path: Path) -> None:
     interrupt = Interrupt("light map")
     with pytest.raises(Cancelled):

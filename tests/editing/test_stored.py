@@ -93,7 +93,7 @@ def test_what_the_store_does_not_have_is_said(store: Store) -> None:
     assert edited_picture(store, changed).is_exact
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_documented_example_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As it stands, but for the size: what it writes is the picture of the session that it writes."""
     page = (Path(__file__).parents[2] / "docs" / "editing.md").read_text("utf-8")

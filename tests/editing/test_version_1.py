@@ -258,7 +258,7 @@ def test_a_coupled_diffuse_term_gets_a_curve_and_new_transport(curve: str, tmp_p
     assert tinted.now.kd_coupled and tinted.start == coupled and np.allclose(tinted.now.kd, (0.15, 0.1, 0.05))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_lobe_of_two_slopes_is_fitted_and_needs_new_transport(tmp_path: Path) -> None:
     edit = layers(layer("amplify_y", 0.5, {"a": 0.1, "b": 0.2, "c": 2.0, "d": 3.0}))
     found = opened(tmp_path, of_document(BRUSHED), {"highlight along": edit})
@@ -275,7 +275,7 @@ def test_models_that_documents_hold_are_exact(tmp_path: Path) -> None:
     assert found.now == found.start and found.now.kd == (0.1, 0.2, 0.3) and not found.now.lobes
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_other_models_are_fitted_and_the_error_is_kept(tmp_path: Path) -> None:
     edit = layers(layer("amplify_y", 0.5, WIDE))
     found = opened(tmp_path, of_model("ward", mx=0.2, my=0.2), {"highlight": edit}, {"specular": [1.0, 0.5, 0.5]})
@@ -288,7 +288,7 @@ def test_other_models_are_fitted_and_the_error_is_kept(tmp_path: Path) -> None:
     assert provenance.metric == "cuberoot" and 0 < provenance.errors["l1"] < 0.02
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_measured_table_is_fitted(tmp_path: Path) -> None:
     known = Material(name="known", kd=0.3, lobes=(Lobe(mx=0.3, my=0.3, k=0.5),))
     write_gonio(file := tmp_path / "paint.txt", synthesise(known, SHORT))

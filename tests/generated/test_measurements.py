@@ -243,7 +243,7 @@ def test_a_fabric_keeps_its_direction(read: Read) -> None:
     np.testing.assert_allclose(table.eval(wi, wo), truth.eval(wi, wo), rtol=0.02)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_half_a_million_rows(read: Read) -> None:
     angles_deg = made.grid(range(0, 80, 5), (0,), range(0, 87), range(360))
     assert len(angles_deg) > 500_000

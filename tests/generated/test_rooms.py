@@ -11,6 +11,7 @@ from lambent.scenes.loaders.load import load_scene
 from tests.generated.rooms import ROOMS, written
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "lights"), [("gallery", 10), ("workshop", 0)])
 def test_rooms_load_whole(name: str, lights: int, tmp_path: Path) -> None:
     scene = load_scene(written(name, tmp_path / "1"))

@@ -37,6 +37,7 @@ def test_it_is_read_or_refused_in_one_line(name: str, tmp_path: Path) -> None:
     assert len({*warnings}) == len(warnings)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", with_long(UNSEEN.keys() - REFUSED.keys(), {*BAKED}))
 def test_its_light_is_finite_and_not_black(name: str, mi: Any, tmp_path: Path) -> None:
     from lambent.baking.bake import bake

@@ -94,6 +94,7 @@ def test_panels_offer_what_there_is(blender, tmp_path):
     assert found["gone"]
 
 
+@pytest.mark.long
 def test_a_material_shows_the_likeness_of_its_document(blender, tmp_path):
     Material(name="paint", kd=(0.6, 0.3, 0.1)).save(tmp_path / "paint.json")
     found = blender("extension", "likeness", tmp_path, stand_in(tmp_path, "convert"))
@@ -102,7 +103,7 @@ def test_a_material_shows_the_likeness_of_its_document(blender, tmp_path):
     assert "paint.json" in found["missing"] and "No such file" in found["missing"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_light_of_a_bake_comes_back_to_blender(blender, mi, tmp_path):
     blender("pool", tmp_path)
     found = blender("extension", "walked", tmp_path, stand_in(tmp_path, "bake", "lightmap"))

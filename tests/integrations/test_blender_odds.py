@@ -77,6 +77,7 @@ def test_a_file_that_is_no_blend_is_one_line(blender, tmp_path, content, said):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.long
 def test_a_cut_blend_and_a_folder_of_the_users_own_are_one_line(odds, tmp_path):
     whole = odds[2] / "odds.blend"
     cut = tmp_path / "cut.blend"

@@ -28,7 +28,7 @@ def irradiance(scene: Scene) -> np.ndarray:
     return watts_per_sr / HIGH_M**2
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_plate_is_lit_as_cycles_lights_it(blender, tmp_path):
     write_constant(tmp_path / "lamp.ies", CANDELA)
     measured = blender("measured", tmp_path)
@@ -39,7 +39,7 @@ def test_a_plate_is_lit_as_cycles_lights_it(blender, tmp_path):
         assert found[name] == pytest.approx(value, rel=0.008 if name == "luminaire" else 0.004), name
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_room_looks_as_cycles_renders_it(blender, mi, tmp_path):
     """Whole paths of both, over tiles of 10 x 10 pixels; glTF's plastic is not Principled's."""
     blender("cornell", tmp_path)

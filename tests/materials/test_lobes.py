@@ -180,6 +180,7 @@ def test_reciprocal(name):
     assert reciprocity_error(MaterialBSDF(Material(lobes=(LOBES[name],)))) < RECIPROCITY_LIMIT
 
 
+@pytest.mark.long
 def test_a_pdf_wrong_by_two_per_cent_is_noticed():
     right = MaterialBSDF(Material(lobes=(Lobe(mx=0.2, my=0.2),)))
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from lambent.baked.light_fields.lookup import blended, normal_weights
 from lambent.published.distance_impostors import fixed_point
 from tests.baked.light_fields.analytic_light_field import ball_field, errors, places
 
 
+@pytest.mark.long
 def test_iteration_finds_the_walls() -> None:
     field = ball_field()
     place, w = places(field)

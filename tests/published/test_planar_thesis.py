@@ -16,6 +16,7 @@ from lambent.realtime.renderer import Renderer
 from tests.realtime.planar.test_realtime_planar import HEIGHT, mirror, scene_of, state
 
 
+@pytest.mark.long
 def test_a_sharp_mirror_is_as_in_motion(device: Any) -> None:
     renderer = Renderer(device, scene_of(mirror(0.001)))
     ours = renderer.image(state(n=3))

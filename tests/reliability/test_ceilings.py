@@ -155,6 +155,7 @@ OWN_FILES = {
 STORE = "store/"  # whose files are its own; `lambent.store` bounds them by the manifest
 
 
+@pytest.mark.long
 def test_every_file_of_a_user_is_opened_by_one_function() -> None:
     found = {place for place in _raw_opens() if not place.startswith(STORE)}
     assert found - set(OWN_FILES) == set(), "open it by lambent.core.inputs"
@@ -214,6 +215,7 @@ def _lines_run(work: Callable[[], object]) -> int:
     return count
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("chained", [False, True])
 def test_time_of_nodes_is_linear(tmp_path: Path, chained: bool) -> None:
     """Of one name, side by side or each the child of the last: each node more runs as many lines as the one before."""
@@ -300,6 +302,7 @@ print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024)
 """
 
 
+@pytest.mark.long
 def test_a_small_file_of_a_large_picture_takes_its_own_memory(tmp_path: Path) -> None:
     """200 MB of pixels in a few kB: the picture, its bytes as Pillow has them, and little besides."""
     Image.new("RGB", (4096, 4096)).save(tmp_path / "a.png")

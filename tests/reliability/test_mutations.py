@@ -21,11 +21,13 @@ def test_every_reader_has_sound_files() -> None:
     assert all(any(name.startswith(found) for name in names) for found in scene_formats())
 
 
+@pytest.mark.long
 def test_every_sound_file_is_used(tmp_path: Path) -> None:
     bench = Bench(tmp_path)
     assert {one.reader: said for one in sound() if (said := bench.use(one, one.files[one.broken]))} == {}
 
 
+@pytest.mark.long
 def test_broken_files_of_every_reader(tmp_path: Path) -> None:
     result = run(tmp_path, 0, SAMPLE, seed=11)
     assert result.failures == {}

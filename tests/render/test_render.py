@@ -155,6 +155,7 @@ def test_films_have_even_sizes_of_their_own(store: Path, tmp_path: Path) -> None
     assert (done.width, done.height) == (50, 32)
 
 
+@pytest.mark.long
 def test_a_scene_without_an_exposure_is_metered(tmp_path: Path) -> None:
     """Its middle is middle grey in every way of drawing, whatever its light; a film keeps the exposure of its start."""
     opened = Store.open(write_small_store(tmp_path / "s"))

@@ -26,6 +26,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
     return bake(LENS.scene(), tmp_path_factory.mktemp("lens") / "s", quality=quality, only=("light_field",))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("camera", "rms", "flip"), [(FRONT, 0.16, 0.18), (OBLIQUE, 0.33, 0.48)], ids=["front", "oblique"]
 )

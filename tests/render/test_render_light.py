@@ -35,6 +35,7 @@ def test_a_still_takes_a_mix(store: Path, baked: np.ndarray, tmp_path: Path) -> 
     assert read_image(tmp_path / "a.exr") == pytest.approx(baked / 2, rel=6e-3, abs=2e-3)
 
 
+@pytest.mark.long
 def test_a_saved_view_has_its_mix_unless_another_is_given(store: Path, baked: np.ndarray, tmp_path: Path) -> None:
     saved = {"cameras": (FRONT.__class__("dusk", FRONT.position, FRONT.target, fov_y_deg=FRONT.fov_y_deg),)}
     change_views(store, lambda views: views.model_copy(update={**saved, "lights": {"dusk": HALF}}))
@@ -44,6 +45,7 @@ def test_a_saved_view_has_its_mix_unless_another_is_given(store: Path, baked: np
     assert read_image(tmp_path / "b.exr") == pytest.approx(baked, rel=6e-3, abs=2e-3)
 
 
+@pytest.mark.long
 def test_the_light_of_a_film_changes_with_its_time(adapter: None, store: Path, tmp_path: Path) -> None:
     names = ("lamp", "sky", "sun")
     track = parse_light([f"{name}={value}@{at}" for name in names for value, at in (("1", 0), ("0", 2))])

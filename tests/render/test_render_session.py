@@ -107,6 +107,7 @@ def left(mode: WalkMode, store: Path, **changes: Any) -> tuple[Settings, Camera 
     return as_left(store, Settings(**changes))
 
 
+@pytest.mark.long
 def test_a_drawn_picture_is_the_windows_to_the_bit(window: WalkMode, store: Path, tmp_path: Path) -> None:
     frame = settled(window)
     shown: Floats = window.drawing._renderer.still_radiance(frame)
@@ -133,6 +134,7 @@ def test_every_kind_of_edit_counts(window: WalkMode, store: Path, part: str) -> 
     assert np.abs(other - whole).max() > 0.01 * whole.max()
 
 
+@pytest.mark.long
 def test_a_traced_picture_is_that_of_the_window_at_rest(window: WalkMode, store: Path) -> None:
     window.state.screen.pace.traces = True
     frame, pictures = settled(window), window.drawing
@@ -160,6 +162,7 @@ def session_of(store: Path, **changes: Any) -> None:
     write_session(store / FILE, WalkSession(view=view).model_copy(update=changes))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("integrator", ["rings", "traced"])
 def test_states_show_their_lamps_also_one_after_the_other(adapter: None, store: Path, integrator: str) -> None:
     moved = RoomState(lamps={0: LampEdit((0.3, 0.8, 0.3))})

@@ -38,6 +38,7 @@ def drawn(store: Path, settings: Settings, notes: list[str] | None = None) -> np
     return np.asarray(made.radiance(scene_record(opened).cameras[0]))
 
 
+@pytest.mark.long
 def test_a_still_ends_at_its_noise_or_its_samples(store: Path, tmp_path: Path) -> None:
     rough, fine = (still(store, tmp_path / "a.exr", settings=Settings(48, 32, noise=n)) for n in (0.1, 0.02))
     assert rough.integrator == fine.integrator == "traced"
@@ -61,6 +62,7 @@ def test_denoising_is_a_choice(store: Path) -> None:
     assert clean < 0.7 * noisy
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("integrator", ["traced", "path"])
 def test_mixes_colours_and_variants_show(store: Path, integrator: str) -> None:
     usual = replace(TRACED, integrator=integrator, samples=64)
@@ -95,6 +97,7 @@ def test_a_film(store: Path, tmp_path: Path) -> None:
     assert all(frame.mean() > 0 for frame in frames) and not np.array_equal(frames[0], frames[-1])
 
 
+@pytest.mark.long
 def test_ctrl_c_keeps_the_picture_so_far(store: Path, tmp_path: Path) -> None:
     notes: list[str] = []
 

@@ -68,6 +68,7 @@ def test_a_store_without_an_answer_shows_the_material_and_says_the_rest(adapter:
         image(bare, replace(SMALL, variant="rd"), tmp_path)
 
 
+@pytest.mark.long
 def test_a_variant_has_its_light_unless_another_is_given(adapter: None, store: Path, tmp_path: Path) -> None:
     baked = image(store, SMALL, tmp_path)
     dim = image(store, replace(SMALL, variant="dim"), tmp_path)
@@ -80,6 +81,7 @@ def test_a_variant_has_its_light_unless_another_is_given(adapter: None, store: P
     assert moving[-1, 0, 2] > 0 and moving[-1, 0, 0] == 0
 
 
+@pytest.mark.long
 def test_states_of_the_session_are_variants(adapter: None, store: Path, tmp_path: Path) -> None:
     """By name; the last one saved is `saved`. A state stands before the scene's variant of its name."""
     red, grey = RED.material, MATERIALS["plaster"].model_copy(update={"kd": (0.2, 0.2, 0.2)})
@@ -119,6 +121,7 @@ def room(mi: object, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "s"
 
 
+@pytest.mark.long
 def test_light_answers_a_variant_as_it_answers_the_same_colour(adapter: None, room: Path, tmp_path: Path) -> None:
     recolour = {"grey": COLOUR}
     by_variant = image(room, replace(SMALL, variant="red"), tmp_path)
@@ -131,6 +134,7 @@ def test_light_answers_a_variant_as_it_answers_the_same_colour(adapter: None, ro
     assert 0.3 < textured.mean() / diffuse.mean() < 0.9
 
 
+@pytest.mark.long
 def test_every_frame_of_changing_paint_is_a_still_of_that_paint(adapter: None, room: Path, tmp_path: Path) -> None:
     colours = [(0.5, 0.5, 0.5), (0.5, 0.3, 0.3), (0.5, 0.1, 0.1)]
     keys = "".join(f"[[keys]]\nat = {at}\nmaterials.grey.kd = {list(colours[2 * at])}\n" for at in (0, 1))
@@ -149,6 +153,7 @@ def test_a_baked_variant_keeps_a_copy_of_its_image(room: Path) -> None:
     assert kept.is_file() and kept.parent == room / "images"
 
 
+@pytest.mark.long
 def test_a_sheet_has_every_variant_and_its_name(adapter: None, store: Path, tmp_path: Path) -> None:
     notes = list[str]()
     done = sheet(store, tmp_path / "sheet.png", "front", replace(SMALL, exposure_ev=0.0), note=notes.append)
@@ -205,6 +210,7 @@ def frames(store: Path, folder: Path, text: str, settings: Settings, path: Camer
     return [read_image(file) for file in sorted(folder.glob("*.exr"))]
 
 
+@pytest.mark.long
 def test_films_are_linear_in_the_mix_between_keyframes(adapter: None, store: Path, tmp_path: Path) -> None:
     keys = '[[keys]]\nat = 0\nas_baked = true\n[[keys]]\nat = 2\nvariant = "dim"\n'
     plain = frames(store, tmp_path / "plain", "[[keys]]\nat = 0\nas_baked = true", SMALL, "tour")
@@ -215,6 +221,7 @@ def test_films_are_linear_in_the_mix_between_keyframes(adapter: None, store: Pat
         frames(store, tmp_path / "twice", keys, replace(SMALL, light=parse_light(["sun=off"])), "tour")
 
 
+@pytest.mark.long
 def test_pictures_of_a_sheet_share_an_exposure_by_their_light(adapter: None, store: Path, tmp_path: Path) -> None:
     """Half the light is metered one stop above the light as baked, which has the exposure of its scene."""
     done = sheet(store, tmp_path / "a.png", "front", SMALL)
@@ -228,6 +235,7 @@ def test_pictures_of_a_sheet_share_an_exposure_by_their_light(adapter: None, sto
         sheet(store, tmp_path / "a.png", "front", SMALL, exposures="all")
 
 
+@pytest.mark.long
 def test_a_stored_state_brings_its_light_to_a_saved_view(adapter: None, store: Path, tmp_path: Path) -> None:
     """A state whose light is as baked says so; a variant without a mix leaves the view's."""
     dusk = Views(cameras=(replace(WITHIN, name="dusk"),), lights={"dusk": DIM})
@@ -244,6 +252,7 @@ def test_a_stored_state_brings_its_light_to_a_saved_view(adapter: None, store: P
     assert mean("red") == pytest.approx(mean("plain") / 2, rel=6e-3)
 
 
+@pytest.mark.long
 def test_a_variant_shows_the_image_of_the_store(adapter: None, store: Path, tmp_path: Path) -> None:
     picture = tmp_path / "bricks.png"
     write_shown(picture, np.array([[[255, 0, 0], [0, 0, 255]]] * 2, np.uint8))

@@ -134,6 +134,7 @@ def made(material, setup, **options):
     return table, samples, fit(samples, whole=table, **options)
 
 
+@pytest.mark.long
 def test_without_an_engine_the_report_says_so(no_engine, tmp_path):
     table, samples, result = made(PAINT, replace(ISOTROPIC, **FEW))
     source = tmp_path / "measured.txt"
@@ -167,6 +168,7 @@ def test_without_an_engine_the_report_says_so(no_engine, tmp_path):
     assert sum(tag == "img" for tag, _ in read.tags) == 4
 
 
+@pytest.mark.long
 def test_an_l2_fit_is_said_to_be_poor_to_the_eye(no_engine):
     table, samples, result = made(PAINT, replace(ISOTROPIC, **FEW), metric="l2_ngan")
     text = " ".join(check(report(table, samples, result)).text)
@@ -175,6 +177,7 @@ def test_an_l2_fit_is_said_to_be_poor_to_the_eye(no_engine):
     assert f"{ratio:.2f} under cuberoot" in text
 
 
+@pytest.mark.long
 def test_transmitting_anisotropic_grey_and_partial(small_previews):
     """All at once: a brushed sheet in grey, whose fit was stopped after its reflection."""
     setup = replace(ANISOTROPIC, theta_i_deg=(5, 35, 65), phi_i_deg=(0, 45, 90), **FEW)
@@ -195,6 +198,7 @@ def test_transmitting_anisotropic_grey_and_partial(small_previews):
     assert sum(tag == "img" for tag, _ in read.tags) >= 3 + 3 + 1
 
 
+@pytest.mark.long
 def test_readings_below_zero_are_counted_as_kept(no_engine):
     dark = Material(name="dark", kd=(0.3, 0.2, 0.0), lobes=PAINT.lobes)
     made_of = made(dark, replace(ISOTROPIC, **FEW, floor=0.02))

@@ -77,6 +77,7 @@ def test_the_frame_has_the_faces_out_of_view(baked_box, box_site):
     assert drawn == 3 * faces
 
 
+@pytest.mark.long
 def test_the_poster_shows_the_room_as_baked(device, blue_box, box_site):
     """Not in the light of the last state, whose wall is blue."""
     renderer = Renderer(device, Store.open(blue_box))
@@ -110,6 +111,7 @@ def test_a_frame_as_data_draws_what_the_renderer_draws(device, baked_box):
     assert np.array_equal(pixels(device, target), image)
 
 
+@pytest.mark.long
 def test_an_interrupted_export_is_no_site_and_is_done_again(adapter, blue_box, box_site, tmp_path):
     def stop(done, total, what):
         if done:
@@ -122,6 +124,7 @@ def test_an_interrupted_export_is_no_site_and_is_done_again(adapter, blue_box, b
     assert manifest_of(tmp_path) == manifest_of(box_site)
 
 
+@pytest.mark.long
 def test_a_site_is_replaced_and_nothing_else(adapter, blue_box, box_site, tmp_path):
     other = tmp_path / "letters"
     other.mkdir()

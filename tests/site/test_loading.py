@@ -89,6 +89,7 @@ def test_coarse_levels_are_enlarged(javascript, size):
     assert at == found.size
 
 
+@pytest.mark.long
 def test_stand_ins_of_blocks_have_their_colour(javascript):
     """As the decoder of light fields reads them: each block has the colour of the texel in its corner."""
     levels = [np.random.default_rng(6).uniform(0, 9, (6, 32 >> k, 32 >> k, 4)).astype(np.float16) for k in range(6)]

@@ -107,7 +107,7 @@ def _memory(page) -> tuple[float, float]:
     return usage["usedSize"] + usage["backingStorageSize"], pages * os.sysconf("SC_PAGE_SIZE")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="this system has no /proc to read memory from")
 def test_reloads_and_states_leave_nothing_behind(chromium, streamed_site):
     with chromium() as page, served(streamed_site) as address:

@@ -50,7 +50,7 @@ def test_where_scripts_do_not_run(chromium, box_site, tmp_path):
         page.wait_for_selector("#message:has-text('scripts cannot be fetched')")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("browser", [firefox, webkit])
 def test_other_browsers_without_webgpu(browser, box_site, tmp_path):
     with browser(tmp_path) as ask, served(box_site) as address:

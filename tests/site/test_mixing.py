@@ -140,7 +140,7 @@ def test_parts_add_up_to_each_state_as_exported(lit):
         )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_mixes_are_those_of_the_native_renderer(chromium, device, lit):
     """Four mixes, among them a group alone, and all but one; the same with red walls; the evening, and back."""
     store = Store.open(lit.store)

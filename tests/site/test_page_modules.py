@@ -109,7 +109,7 @@ def node_packages():
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_types_fit(node_packages, tmp_path):
     options = {
         "allowJs": True, "checkJs": True, "noEmit": True, "strict": True, "target": "ES2022", "module": "ES2022",
@@ -124,7 +124,7 @@ def test_types_fit(node_packages, tmp_path):
     assert done.returncode == 0, done.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_page_is_formatted(node_packages):
     files = sorted([*PAGE.glob("*.*"), *STILLS_PAGE.glob("*.*")])
     command = ["node", node_packages / "prettier/bin/prettier.cjs", "--print-width", "120", "--check", *files]

@@ -87,7 +87,7 @@ def test_pictures_are_those_of_the_native_renderer(chromium, device, blue_box, b
             assert_same_picture(next(found), renderer.display_image(state), camera.name)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_mirrors_panes_and_edges_are_those_of_the_native_renderer(chromium, device, hall_store, hall_site):
     """In motion with and without averaged edges, and at rest."""
     renderer = Renderer(device, Store.open(hall_store))

@@ -83,6 +83,7 @@ def test_the_page_names_every_still(stills):
     assert "http:" not in text and "https:" not in text, "no third party is asked"
 
 
+@pytest.mark.long
 def test_stills_are_those_of_the_store(store, stills):
     opened = lambent.open(store)
     for view, camera in enumerate(("front", VIEW.name), 1):
@@ -99,6 +100,7 @@ def picture(folder, view: int, state: int):
     return np.asarray(Image.open(folder / f"pictures/{view}-{state}.webp").convert("RGB"), float)
 
 
+@pytest.mark.long
 def test_an_interrupted_export_says_so_and_is_done_again(store, tmp_path):
     def stop(done, total, what):
         if done > 0.5 * total:

@@ -79,7 +79,7 @@ def test_modes_are_found(toys, tmp_path):
         app.run(tmp_path, "toi")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_toy_mode_opens_rings_and_closes_at_an_interrupt(virtual_screen, open_window, toys, tmp_path):
     """Dear ImGui finds the size of new text one frame later: without further frames, a message is cut off."""
     session = open_window(tmp_path / "train.toy", tmp_path, (480, 320), f"found:{toys}")

@@ -109,6 +109,7 @@ def test_resize_and_picture(session):
     assert png[400:].mean() > png[:100].mean(), "the floor is lit, the sky above the wall is dark: upside down?"
 
 
+@pytest.mark.long
 def test_close(window, store):
     """Last, because it closes the window of the tests before; a material was changed, and a walk recorded."""
     window.tool("key", "Escape")

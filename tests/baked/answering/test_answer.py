@@ -169,6 +169,7 @@ def test_points_brighten_no_more_than_what_their_rays_gather() -> None:
     )
 
 
+@pytest.mark.long
 def test_light_in_a_gap_that_patches_do_not_resolve_is_reflected_many_times() -> None:
     """A patch has a lit point and seven in a gap, whose rays end on all eight alike: I = a (7 I + 1) / 8."""
     weight = np.ones((8, 64))

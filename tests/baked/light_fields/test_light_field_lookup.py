@@ -151,6 +151,7 @@ def test_places_without_points_are_black_and_finite(field: LightField) -> None:
     np.testing.assert_array_equal(answer.radiance, 0)
 
 
+@pytest.mark.long
 def test_quarters_of_texels_sharpen_the_edge_of_a_roof() -> None:
     """So the error over all directions falls."""
     field = ball_field(144, 96, open_roof=True)

@@ -53,6 +53,7 @@ def rows_of(maps: int, rows: int, shift: int) -> list[int]:
     return [row // shift + column for row in range(rows) for column in range(maps) for _ in range(2)]
 
 
+@pytest.mark.long
 def test_the_adaptive_policy_is_near_the_better_one() -> None:
     """Also where maps are read by chance, or again and again nearby, and where the kind of reads changes."""
     rng = np.random.default_rng(4)

@@ -53,6 +53,7 @@ def sheet() -> Scene:
     return Scene("sheet", objects, {"black": BLACK, "paper": Material(kd=0.2, kt_d=0.4)})
 
 
+@pytest.mark.long
 def test_light_through_a_sheet_follows_what_it_transmits(tmp_path: Path) -> None:
     stored = read_answer(bake(sheet(), tmp_path / "s", quality=TINY, only=("answer",)))
     answer = stored.answer
@@ -65,6 +66,7 @@ def test_light_through_a_sheet_follows_what_it_transmits(tmp_path: Path) -> None
     assert floor.sum() > 100 and np.median(ratio) == pytest.approx(0.5, abs=0.02)
 
 
+@pytest.mark.long
 def test_an_interrupted_answer_goes_on_and_ends_the_same(tmp_path: Path) -> None:
     whole = bake(room_with_step(), tmp_path / "whole", quality=TINY, only=("answer",))
     for at in ("direct light", "gathering", "answer of the probe of ball"):

@@ -66,6 +66,7 @@ def test_without_an_edit_the_groups_are_those_of_the_store(store: Store, scene: 
     assert light.groups(light.as_baked) is scene.groups and light.groups(light.lit({})) is scene.groups
 
 
+@pytest.mark.long
 def test_every_group_answers_as_a_bake_of_the_other_colour(store: Store, scene: BakedScene, tmp_path: Path) -> None:
     grey = two_lamps().materials["grey"]
     other = replace(two_lamps(), materials={**two_lamps().materials, "grey": grey.model_copy(update={"kd": RED})})
@@ -97,6 +98,7 @@ def test_light_answers_on_the_gpu_as_in_a_new_scene_and_comes_back(store: Store,
     assert np.array_equal(renderer.image(replace(VIEW, light=mix)), before)
 
 
+@pytest.mark.long
 def test_the_sun_is_in_the_light_of_its_group_alone(tmp_path: Path) -> None:
     """Two plates face each other: the lower one reflects the sun onto the upper one, whose light is indirect alone."""
     plates = (

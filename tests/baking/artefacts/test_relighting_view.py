@@ -86,11 +86,13 @@ def assert_is_traced(found: np.ndarray, scene: Scene) -> None:
     assert np.abs(found.mean(axis=(0, 1)) / expected.mean(axis=(0, 1)) - 1).max() < FLOOR
 
 
+@pytest.mark.long
 def test_it_begins_with_the_light_of_the_bake(view: RelitView, scene: Scene) -> None:
     assert 0 < view.error < 0.015
     assert_is_traced(drawn(view), scene)
 
 
+@pytest.mark.long
 def test_a_turned_environment_is_traced_as_one(view: RelitView, scene: Scene) -> None:
     view.turn(70.0)
     assert isinstance(scene.environment, ImageEnvironment)
@@ -98,6 +100,7 @@ def test_a_turned_environment_is_traced_as_one(view: RelitView, scene: Scene) ->
     assert_is_traced(drawn(view), replace(scene, environment=turned))
 
 
+@pytest.mark.long
 def test_another_environment_is_traced_as_one_and_pictures_are_linear_in_it(
     view: RelitView, scene: Scene, folder: Path
 ) -> None:
@@ -135,6 +138,7 @@ def test_a_new_environment_needs_no_new_transport(store: Store, scene: Scene, fo
     bake_view(scene, folder / "s")
 
 
+@pytest.mark.long
 def test_lamps_stay_while_the_environment_turns(folder: Path) -> None:
     """A point light and a glowing square under a dark sky: what the path tracer says, whatever the environment."""
     lamp = SceneObject("lamp", patch((-1.2, 0.0, -2.5), (2.4, 0, 0), (0, 0.9, 0)), "grey", (5.0, 4.0, 3.0))
@@ -147,6 +151,7 @@ def test_lamps_stay_while_the_environment_turns(folder: Path) -> None:
     assert_is_traced(drawn(view), replace(lit, environment=None))
 
 
+@pytest.mark.long
 def test_pixels_beside_surfaces_show_the_environment(folder: Path) -> None:
     """A camera that looks past a small ball, along -z, at a picture whose middle column is front."""
     picture = np.zeros((64, 128, 3), np.float32)
@@ -201,6 +206,7 @@ def test_the_command_draws_what_python_draws(store: Store, view: RelitView, fold
         assert run(["relight", str(store.folder), "-o", str(folder / "x.exr"), *wrong]) == 2
 
 
+@pytest.mark.long
 def test_an_interrupted_bake_ends_with_the_same_arrays(
     scene: Scene, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

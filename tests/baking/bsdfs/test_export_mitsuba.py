@@ -19,6 +19,7 @@ def evaluated(bsdf, samples):
     return f_cos(bsdf, samples.wi, samples.wo) / samples.wi[:, 2:]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [one.name for one in (BRUSHED, GOLD, FOIL, PAPER)])
 def test_mitsuba_evaluates_what_is_claimed(mi, name, tmp_path):
     material = ALL[name]

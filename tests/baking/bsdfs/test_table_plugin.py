@@ -150,6 +150,7 @@ def turned(mi, sheet, tmp_path_factory):
     return interaction
 
 
+@pytest.mark.long
 def test_on_a_turned_surface_samples_values_and_densities_agree_in_world_space(mi, sheet, turned):
     """Samples and density that ignored the tangent alike would agree with each other, but not with the grid."""
 
@@ -178,6 +179,7 @@ def test_on_a_turned_surface_samples_values_and_densities_agree_in_world_space(m
     np.testing.assert_allclose(np.array(weight)[:, some], np.array(value / pdf)[:, some], rtol=2e-2, atol=1e-3)
 
 
+@pytest.mark.long
 def test_closed_box_of_albedo_and_emission_one_half_has_radiance_one(mi):
     """White furnace of a Lambertian table: sum of .5 (1/2)^n."""
     table = table_dict(Exact(Material(kd=0.5), isotropic=True), shape=GridShape(8, 1, 32, 16))

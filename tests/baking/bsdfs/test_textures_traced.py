@@ -158,6 +158,7 @@ def test_cached_light_is_tinted_by_the_diffuse_texture() -> None:
     np.testing.assert_allclose(shown, [0.4, 0.8, 0.2], rtol=1e-4)
 
 
+@pytest.mark.long
 def test_diffuse_light_on_bumps_is_that_of_path_tracing(adapter, tmp_path) -> None:
     """A wall whose halves' normals lean to the left and to the right, between a lamp and a lit wall."""
     from lambent.baking.bake import bake

@@ -130,6 +130,7 @@ def path_traced(
 FIRST = {name: Material(kd=0.5) for name in ("floor", "back", "side", "ball")}
 
 
+@pytest.mark.long
 def test_diffuse_rooms_are_those_of_the_path_tracer(tmp_path: Path) -> None:
     """Albedos that the bake did not know; all lengths of paths; one material is not edited."""
     later = {
@@ -157,6 +158,7 @@ def stepped(material: Editable, rng: np.random.Generator, sharp: int = 64) -> Ed
     return replace(material, curves=curves)
 
 
+@pytest.mark.long
 def test_random_tables_of_bands(tmp_path: Path) -> None:
     """Any curves at the first surface and any colours of the others, from one bake; pixels are nearly points.
 
@@ -177,6 +179,7 @@ def test_random_tables_of_bands(tmp_path: Path) -> None:
         assert np.median(error / found.mean(axis=(0, 1))) < 0.03
 
 
+@pytest.mark.long
 def test_two_glossy_surfaces(tmp_path: Path) -> None:
     """Bands at the second surface too: a glossy ball shows glossy walls, and a material that is not edited."""
     dull, shiny = (Material(kd=kd, lobes=(Lobe(mx=m, my=m, r0=0.5),)) for kd, m in ((0.1, 0.5), (0.3, 0.3)))
@@ -190,6 +193,7 @@ def test_two_glossy_surfaces(tmp_path: Path) -> None:
     assert abs(found.mean() / expected.mean() - 1) < 0.02
 
 
+@pytest.mark.long
 def test_samples_are_added_to_a_finished_store(tmp_path: Path) -> None:
     """Batch after batch: the same light with less noise; what is enough is not traced again."""
     scene = corner(FIRST)

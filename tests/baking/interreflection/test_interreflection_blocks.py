@@ -78,6 +78,7 @@ def test_sums_are_those_of_loops(terms: int) -> None:
     assert again.unit == tile.unit and np.array_equal(again.array, tile.array)
 
 
+@pytest.mark.long
 def test_many_samples_are_traced_for_few_points_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """A furnace's light is known whatever the blocks; no block has more paths than may be in memory."""
     widths: list[tuple[int, int]] = []

@@ -38,6 +38,7 @@ def baked(folder: Path, seed: int) -> Store:
     return Store.open(folder)
 
 
+@pytest.mark.long
 def test_the_noise_is_noted_and_is_that_between_bakes(tmp_path: Path) -> None:
     stores = [baked(tmp_path / f"{seed}", seed) for seed in (0, 1)]
     noted = [noted_noise(store, FROM_ABOVE, SIZE, 64) for store in stores]

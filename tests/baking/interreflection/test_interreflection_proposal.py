@@ -43,6 +43,7 @@ def with_small_things() -> Scene:
     return replace(scene, objects=(*scene.objects, bead, screen), materials={**scene.materials, **more})
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("short_trials")
 def test_what_is_small_in_the_view_and_in_its_light_is_fixed() -> None:
     found = propose(with_small_things(), VIEW, replace(BOUNCES, fixed=frozenset({"ball"})))
@@ -62,6 +63,7 @@ def found() -> Proposal:
     return propose(corner(KINDS), VIEW, BOUNCES)
 
 
+@pytest.mark.long
 def test_what_the_bake_takes_was_said_before(found: Proposal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene, counts = corner(KINDS), {"calls": 0, "tiles": 0}
 
@@ -121,6 +123,7 @@ def short_trials(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trial, "paths_at_once", lambda slow: 1 << 12)
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("short_trials")
 def test_what_the_user_wants_to_edit_is_kept_and_views_agree() -> None:
     scene, quick = with_small_things(), replace(BOUNCES, samples=16)
@@ -133,6 +136,7 @@ def test_what_the_user_wants_to_edit_is_kept_and_views_agree() -> None:
     assert far.same == near.same == {}
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("short_trials")
 def test_materials_that_look_the_same_are_merged_where_the_store_would_not_fit() -> None:
     twins = corner({**KINDS, "side": KINDS["back"]})

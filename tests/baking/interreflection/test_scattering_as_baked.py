@@ -77,11 +77,13 @@ def compared(scene: Scene, later: dict[str, Editable], folder: Path, series: tup
     assert abs(found.mean() / expected.mean() - 1) < 3 * error + 0.003
 
 
+@pytest.mark.long
 def test_a_glossy_room_is_that_of_the_path_tracer(tmp_path: Path) -> None:
     """A diffuse wall between glossy ones; once it was a few percent off."""
     compared(room(GLOSSY), {}, tmp_path, (16, 1, 1, 1))
 
 
+@pytest.mark.long
 def test_strengths_of_what_is_glossy_are_exact_too(tmp_path: Path) -> None:
     """Where all of a material is scaled alike, or its one term is tinted, by channels and to black and from it."""
     dark = GLOSS.model_copy(update={"lobes": (GLOSS.lobes[0].model_copy(update={"k": (0.9, 0.5, 0.0)}),)})
@@ -94,6 +96,7 @@ def test_strengths_of_what_is_glossy_are_exact_too(tmp_path: Path) -> None:
     compared(scene, {"back": tinted, "floor": half}, tmp_path, (16, 1))
 
 
+@pytest.mark.long
 def test_a_textured_floor_beside_a_wall(tmp_path: Path) -> None:
     """Texel by texel, not by their mean, which would be 3 % off, where nothing is edited."""
     texels = np.full((2, 64, 3), 0.2, np.float16)
@@ -102,6 +105,7 @@ def test_a_textured_floor_beside_a_wall(tmp_path: Path) -> None:
     compared(scene, {}, tmp_path, (16, 1))
 
 
+@pytest.mark.long
 def test_light_through_a_glossy_sheet(tmp_path: Path) -> None:
     """A sheet between the lamp and the wall, which scatters to both sides, each with a slot of its own."""
     sheet = Material(kd=0.2, kt_d=0.2, lobes=(Lobe(side="transmission", mx=0.2, my=0.2, r0=0.1, k=0.7, alpha=0.5),))
@@ -111,6 +115,7 @@ def test_light_through_a_glossy_sheet(tmp_path: Path) -> None:
     compared(scene, {}, tmp_path, (16, 1, 1))
 
 
+@pytest.mark.long
 def test_materials_that_are_not_those_of_their_documents(tmp_path: Path) -> None:
     """A model in place of a document scatters as the model."""
     compared(room(FIRST), MODELS, tmp_path, (16, 1))
@@ -137,6 +142,7 @@ def test_a_store_knows_the_state_that_it_is_baked_of(tmp_path: Path) -> None:
     assert keys({**FIRST, "floor": SHINY}, diffuse_seen=True) == diffuse
 
 
+@pytest.mark.long
 def test_surfaces_seen_as_diffuse_ones(tmp_path: Path) -> None:
     """The picture of a glossy room is then that of Lambertian walls of the same albedos."""
     scene, found = room(GLOSSY), []
@@ -190,6 +196,7 @@ def test_states_differ_by_the_whole_of_a_curve() -> None:
     assert set(unlike_documents(scene, {"floor": named, "back": moved, "nowhere": moved})) == {"back"}
 
 
+@pytest.mark.long
 def test_another_process_traces_the_same(mi: ModuleType) -> None:
     """A tracer that was sent has the same surfaces: models in place of documents, and whether others are diffuse."""
     scene, few = room(GLOSSY), Bounces((4, 1, 1))

@@ -89,6 +89,7 @@ def by_group() -> tuple[np.ndarray, np.ndarray, list[str]]:
     return sums_at_points(corner())
 
 
+@pytest.mark.long
 def test_groups_add_up_to_all_light(by_group: Any) -> None:
     mean, variance, names = by_group
     expected, its_variance, _ = sums_at_points(corner(), whole=True)
@@ -161,6 +162,7 @@ def test_a_store_has_groups_that_add_up_to_what_it_shows(baked: Store) -> None:
     assert parts[known].reshape(-1, 4, 3)[:, :2].sum(axis=1) == pytest.approx(means, rel=2**-12, abs=1e-5)
 
 
+@pytest.mark.long
 def test_a_bake_with_groups_goes_on_where_it_was_interrupted(baked: Store, tmp_path: Path) -> None:
     scene, calls = replace(room_with_step(), lights=BULBS), []
 
@@ -195,6 +197,7 @@ def test_lights_of_single_colours_stay_apart(tmp_path: Path) -> None:
     assert light_groups(store)[names.index("red")].share == pytest.approx(0.2126 / (0.2126 + 2 * 0.0722), rel=0.02)
 
 
+@pytest.mark.long
 def test_groups_are_named_by_the_scene_and_change_with_it(tmp_path: Path) -> None:
     scene = replace(room_with_step(), lights=BULBS)
     quality = TINY.changed("rough", light_map={"samples": (4, 4)})
@@ -222,6 +225,7 @@ def test_samples_by_group_are_rounded_evenly(mi: Any) -> None:
     assert len(zlib.compress(found.tobytes())) < 0.8 * len(zlib.compress(means.tobytes()))
 
 
+@pytest.mark.long
 def test_light_that_no_viewer_sees_has_no_share(tmp_path: Path) -> None:
     """A crate reaches through the floor of a closed room: its underside lies in the sky, which nobody inside sees."""
     room = (

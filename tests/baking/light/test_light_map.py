@@ -73,6 +73,7 @@ def test_light_from_behind_reaches_only_the_far_side_of_a_sheet(tmp_path: Path) 
     assert np.allclose(known(store, "traced_back"), 1.0, rtol=0.1)
 
 
+@pytest.mark.long
 def test_gathering_lowers_the_noise_and_texels_within_a_solid_are_filled(tmp_path: Path) -> None:
     store = bake(room_with_step(), tmp_path / "s", quality=GATHERING, only=("light_map",))
     assert known(store, "gathered").mean() == pytest.approx(known(store).mean(), rel=0.01)

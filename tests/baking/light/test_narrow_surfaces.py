@@ -72,6 +72,7 @@ def strip_of(store: Store) -> tuple[np.ndarray, np.ndarray]:
     return texel_areas(geometry, width, height), block.reshape(height, width).clip(0, BLOCKS - 1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("integrator", ["paths", "photons"])
 def test_mean_irradiance_is_that_of_the_whole_width(tmp_path: Path, integrator: str) -> None:
     store = bake(scene(), tmp_path / integrator, quality=QUALITY, light_map=integrator, only=("light_map",))

@@ -139,6 +139,7 @@ def tile(half: float, chamfer: float, deep: float) -> Mesh:
     return merge(parts)
 
 
+@pytest.mark.long
 def test_chamfers_leave_no_lines_on_a_floor_of_tiles(tmp_path: Path) -> None:
     """Tops of tiles under an even sky receive pi, also where they meet the chamfers, whose light is less."""
     one, step = tile(0.3, 0.003, 0.01), 0.602

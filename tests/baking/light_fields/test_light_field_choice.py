@@ -160,6 +160,7 @@ def test_reflectors_show_shares_of_areas(beside: Scene, monkeypatch: pytest.Monk
     assert shown == {"corner": pytest.approx(0.5 / 0.58)}, "both large faces of a thin box"
 
 
+@pytest.mark.long
 def test_a_bake_chooses_and_keeps_its_choice(
     beside: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -188,6 +189,7 @@ def test_a_bake_chooses_and_keeps_its_choice(
     assert not light_fields_of(store) and not store.artefacts("light_field")
 
 
+@pytest.mark.long
 def test_an_error_that_is_asked_for_decides_how_many_points(beside: Scene, tmp_path: Path) -> None:
     quality = TINY.changed("tiny", light_field={"points": 24, "texels": 8, "strata": 1})
     counts = []
@@ -198,6 +200,7 @@ def test_an_error_that_is_asked_for_decides_how_many_points(beside: Scene, tmp_p
     assert counts[0] == 16 and counts[0] <= counts[1] <= 24
 
 
+@pytest.mark.long
 def test_what_stands_alone_under_the_sky_keeps_its_probe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A convex box far from everything: the probe is right."""
     monkeypatch.setattr("lambent.baking.light_fields.trial.COUNTS", (16, 32))

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from lambent.baked.light_fields.light_field import NO_POINT
 from lambent.baked.light_fields.stored import read_light_field
@@ -37,6 +38,7 @@ def test_normals_that_point_away_from_viewers_are_known(mi: Any) -> None:
         assert (np.sum(turned.normals * turned.positions, axis=1) > 0).all()
 
 
+@pytest.mark.long
 def test_points_of_an_inverted_object_stand_on_the_side_that_is_seen(tmp_path: Path) -> None:
     scene = replace(inverted(coloured_room()), cameras=EYES, light_fields={"ball": LightFieldWish()})
     field = read_light_field(bake(scene, tmp_path / "s", quality=SMALL, only=("light_field",)), "ball")

@@ -37,6 +37,7 @@ def room(lamp: float, wall_lamp: float) -> Scene:
     return replace(step, objects=(*others, above, beside, BALL), light_fields={"ball": wish})
 
 
+@pytest.mark.long
 def test_it_is_that_of_a_bake_in_this_mix(tmp_path: Path) -> None:
     """Not what was baked; what is left is beside the lamp that is off, whose light texels have spread."""
     device = open_device()

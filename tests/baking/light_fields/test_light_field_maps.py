@@ -175,6 +175,7 @@ def test_only_what_is_asked_is_baked_and_what_is_no_longer_asked_goes(tmp_path: 
     assert {a.name: a.key for a in store.artefacts()} == kept, "nothing else is baked again"
 
 
+@pytest.mark.long
 def test_traced_whole_it_is_the_same_within_noise(tmp_path: Path) -> None:
     scene = replace(room_with_step(), light_fields={"ball": LightFieldWish(points=24, texels=14)})
     quality = TINY.changed(light_field={"strata": 4})

@@ -78,6 +78,7 @@ def pane_room() -> Scene:
     )  # fmt: skip
 
 
+@pytest.mark.long
 def test_glass_knows_the_face_behind_each_place(tmp_path: Path) -> None:
     store = baked(pane_room(), tmp_path / "s")
     field = read_light_field(store, "pane")

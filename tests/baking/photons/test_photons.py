@@ -60,6 +60,7 @@ def test_photons_are_counted_by_side_and_texel_in_whole_units(mi: Any, monkeypat
         assert np.array_equal(np.array(sums).reshape(sides, 6, 3), expected[:sides])
 
 
+@pytest.mark.long
 def test_closed_diffuse_box_has_radiance_one(tmp_path: Path) -> None:
     store = photon_baked(furnace(), tmp_path / "s")
     assert areas(store).sum() == pytest.approx(24.0, rel=1e-6)
@@ -77,6 +78,7 @@ def test_closed_diffuse_box_has_radiance_one(tmp_path: Path) -> None:
     assert store.artefact("light_map/irradiance").meta["noise"] == pytest.approx(noise, rel=0.15), "as it is known here"
 
 
+@pytest.mark.long
 def test_plane_under_a_constant_sky_receives_pi(tmp_path: Path) -> None:
     environment = ImageEnvironment(constant_picture(tmp_path, 2.0))
     store = photon_baked(replace(plane(), environment=environment), tmp_path / "s")
@@ -93,6 +95,7 @@ def test_plane_under_the_sun_receives_the_cosine(tmp_path: Path, cosine: float) 
     assert np.array(found.irradiance) * found.direction[1] == pytest.approx(np.array([3, 2, 1]) * cosine)
 
 
+@pytest.mark.long
 def test_plane_under_lamps_receives_the_inverse_square(tmp_path: Path) -> None:
     lamp = PointLight((0.0, 1.0, 0.0), (4.0, 4.0, 4.0))
     spot = PointLight((0.0, 1.0, 0.0), (2.0, 2.0, 2.0), (0.0, -1.0, 0.0), 60.0, 60.0)  # covers the square's corners
@@ -108,6 +111,7 @@ def test_plane_under_lamps_receives_the_inverse_square(tmp_path: Path) -> None:
     assert means.mean() == pytest.approx(wanted[whole].mean(), rel=0.01)
 
 
+@pytest.mark.long
 def test_low_lamp_far_from_the_origin_lights_the_floor_before_it(tmp_path: Path) -> None:
     """Mitsuba's offset of rays is 9 mm there, a third of the lamp's height: as if the lamp stood so much nearer."""
     high, far = 0.03, 100.0
@@ -140,6 +144,7 @@ def test_light_from_behind_reaches_only_the_far_side_of_a_sheet(tmp_path: Path) 
     assert np.allclose(store.read("light_map/irradiance_back"), 1.0, rtol=0.12)
 
 
+@pytest.mark.long
 def test_interrupted_and_resumed_is_the_same_bit_for_bit(tmp_path: Path) -> None:
     small = SMALL.changed(light_map={"photons_per_texel": 32})
     whole = photon_baked(furnace(), tmp_path / "whole", small)

@@ -83,6 +83,7 @@ def scores(photons: Store, paths: Store) -> np.ndarray:
     return np.array(found)
 
 
+@pytest.mark.long
 def test_measured_table_throws_the_same_light_by_photons_and_by_paths(tmp_path: Path, table: Path) -> None:
     scene = room(table)
     photons = bake(scene, tmp_path / "photons", quality=QUALITY, light_map="photons", only=("light_map",))

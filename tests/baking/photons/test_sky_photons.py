@@ -23,6 +23,7 @@ def shot(store: Store) -> np.ndarray:
     return shot_of(store.read("light_map/photons")).astype(float)
 
 
+@pytest.mark.long
 def test_window_lets_in_the_flux_of_its_area(tmp_path: Path) -> None:
     scene = pit(ConstantEnvironment((1.0, 2.0, 1.0)))
     store = bake(scene, tmp_path / "s", quality=SMALL, light_map="photons", only=["light_map"])
@@ -32,6 +33,7 @@ def test_window_lets_in_the_flux_of_its_area(tmp_path: Path) -> None:
     assert np.all(np.abs(flux.mean(axis=0) - wanted) < 4 * error) and np.all(error < 0.05 * wanted)
 
 
+@pytest.mark.long
 def test_landing_places_bring_the_same_light_as_the_disc(tmp_path: Path) -> None:
     scene = pit(sunny(tmp_path))
     scene = replace(scene, materials={"black": scene.materials["black"].model_copy(update={"kd": (0.5, 0.5, 0.5)})})
@@ -48,6 +50,7 @@ def test_landing_places_bring_the_same_light_as_the_disc(tmp_path: Path) -> None
     assert np.all(np.abs(means[0] - means[1]) < 4.5 * error), "on either side"
 
 
+@pytest.mark.long
 def test_photons_stop_at_the_noise(tmp_path: Path) -> None:
     quality = SMALL.changed(light_map={"noise": 1.0})
     few = bake(furnace(), tmp_path / "few", quality=quality, light_map="photons", only=["light_map"])

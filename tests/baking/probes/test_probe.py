@@ -38,6 +38,7 @@ def test_noisy_texels_get_more_paths() -> None:
     np.testing.assert_allclose(times, [1, 4 / samples / (0.1 * 2) ** 2, MOST])
 
 
+@pytest.mark.long
 def test_probe_agrees_with_path_traced_views(tmp_path: Path) -> None:
     scene = room_with_step()
     small = SceneObject("ball", placed(sphere(0.02, 16, 8), (-0.8, 0.5, 0)), "mirror")  # casts next to no shadow
@@ -105,6 +106,7 @@ def test_the_floors_probe_stands_at_eye_height_in_the_room() -> None:
     assert np.allclose(centre_of((floor, low), "floor"), (0, 1.0, 0), atol=2e-3), "half way to a low ceiling"
 
 
+@pytest.mark.long
 def test_the_probe_of_a_floor_does_not_stand_below_the_table_in_its_middle(tmp_path: Path) -> None:
     floor = SceneObject("floor", patch((-4, 0, -3), (0, 0, 6), (8, 0, 0)), "m")
     walls = SceneObject("walls", placed(box((8, 3.1, 6)), (0, 1.45, 0)), "d")
@@ -132,6 +134,7 @@ def panel_under_a_mast() -> tuple[SceneObject, ...]:
     return SceneObject("flat", placed(box((0.8, 0.02, 0.6)), (0, 2.0, 0)), "m"), mast
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("objects", "eye", "side"),
     [(tray_on_a_column(), (0.3, 1.2, 1.5), (0, 1, 0)), (panel_under_a_mast(), (0.3, 0.5, 1.5), (0, -1, 0))],

@@ -41,6 +41,7 @@ def two_rooms() -> Scene:
     return Scene("two rooms", objects, {"grey": GREY, "black": BLACK, "mirror": MIRROR})
 
 
+@pytest.mark.long
 def test_object_in_two_rooms_has_a_probe_in_each(tmp_path: Path) -> None:
     store = bake(two_rooms(), tmp_path / "s", quality=TINY, only=("probe",))
     objects = {o.name: o for o in scene_record(store).objects}
@@ -74,6 +75,7 @@ def test_a_cut_that_viewers_do_not_see_is_not_made() -> None:
     assert set(cuts_of(TriangleVisibility(replace(two_rooms(), cameras=(red, blue))))) == {"bar"}
 
 
+@pytest.mark.long
 def test_too_few_probes_are_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """A mirror of few faces cannot be cut."""
     scene = two_rooms()

@@ -41,6 +41,7 @@ def lamp(at: tuple[float, float, float]) -> Mesh:
     return patch(np.array(at) - across / 2 - up / 2, across, up)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["traced", "cached"])
 def test_every_face_has_its_lamp_in_its_texel(tmp_path: Path, method: str) -> None:
     """Off the axes, so that a face that is mirrored or turned shows it elsewhere; distances likewise."""
@@ -83,6 +84,7 @@ def test_each_side_shows_its_own_light_and_what_passes(
     np.testing.assert_allclose(sheet_of_light(material, z), expected, rtol=1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["traced", "cached"])
 def test_a_probe_sees_a_sheet_lit_from_one_side_and_the_other(tmp_path: Path, method: str) -> None:
     """The sheet's normal points to the probe or away; the sun stands on the probe's side or behind the sheet."""
@@ -103,6 +105,7 @@ def test_a_probe_sees_a_sheet_lit_from_one_side_and_the_other(tmp_path: Path, me
         np.testing.assert_allclose(seen, expected, rtol=0.03, err_msg=f"case {number}, sun towards {z}")
 
 
+@pytest.mark.long
 def test_planes_are_found_whichever_way_the_walls_face(tmp_path: Path) -> None:
     """The normal that counts is that on the probe's side. The room is turned and moved: no box around it would do."""
     room, about, place = coloured_room(), turn("y", 30), np.array([10.0, 0, 0])

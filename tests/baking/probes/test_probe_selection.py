@@ -142,6 +142,7 @@ def well(folder: Path) -> Scene:
                  cameras=(camera,))  # fmt: skip
 
 
+@pytest.mark.long
 def test_a_pit_is_shown_no_more_sky_than_it_sees(tmp_path: Path) -> None:
     scene = well(tmp_path)
     scene = replace(scene, objects=scene.objects[:1])
@@ -154,6 +155,7 @@ def test_a_pit_is_shown_no_more_sky_than_it_sees(tmp_path: Path) -> None:
     assert meta["mirror_error"] < 0.3
 
 
+@pytest.mark.long
 def test_a_ball_in_the_open_keeps_all_its_light(tmp_path: Path) -> None:
     scene = well(tmp_path)
     store = bake(replace(scene, objects=scene.objects[1:]), tmp_path / "s", quality=TINY, only=("probe",))

@@ -71,6 +71,7 @@ def test_a_lamp_that_the_probe_misses_leaves_the_shares_of_other_directions() ->
     assert np.abs(shares(None) - 1).max() > 0.3, "otherwise it would"
 
 
+@pytest.mark.long
 def test_below_a_roof_no_light_comes_from_above_and_all_from_the_side(tmp_path: Path) -> None:
     """A floor under a white sky, with a black roof close over one end, which its probe sees from the side."""
     floor = SceneObject("floor", patch((-2, 0, 1), (4, 0, 0), (0, 0, -2)), "glossy")

@@ -67,6 +67,7 @@ def test_neighbours_share_and_a_pin_has_none(table: Path) -> None:
         assert {a.name: a.key for a in again.artefacts()} == before
 
 
+@pytest.mark.long
 def test_an_object_that_gets_its_own_probe_again_is_baked(table: Path, tmp_path: Path) -> None:
     folder = tmp_path / "s"
     shutil.copytree(table, folder)
@@ -77,6 +78,7 @@ def test_an_object_that_gets_its_own_probe_again_is_baked(table: Path, tmp_path:
     assert shared not in probes_of(bake_probes(laid_table(), folder)), "what is no longer shown is dropped"
 
 
+@pytest.mark.long
 def test_a_lamp_is_not_left_out_of_its_neighbours_reflections(tmp_path: Path) -> None:
     scene = laid_table()
     lit = tuple(replace(o, emission=(3.0, 3.0, 3.0)) if o.name == "bead2" else o for o in scene.objects)
@@ -84,6 +86,7 @@ def test_a_lamp_is_not_left_out_of_its_neighbours_reflections(tmp_path: Path) ->
     assert "bead2" not in owners.values() and "bead2" not in owners
 
 
+@pytest.mark.long
 def test_no_probe_shows_a_lamp_without_its_shade(tmp_path: Path) -> None:
     """Beads under a lamp in a tray: a probe that they share with the tray leaves it out, and shows them the lamp."""
     walls = [((0.16, 0.01, 0.16), (0, 0, 0))]
@@ -105,6 +108,7 @@ def test_no_probe_shows_a_lamp_without_its_shade(tmp_path: Path) -> None:
         assert float(store.read(array.name).astype(float).max()) * array.meta["unit"] < 250, "the lamp is hidden"
 
 
+@pytest.mark.long
 def test_in_a_closed_room_no_probe_shows_the_sky(tmp_path: Path) -> None:
     """Not even through the floor, ceiling or wall whose probe it is, or that another object shares."""
     glossy = Material(kd=(0.5, 0.5, 0.5), lobes=(Lobe(mx=0.6, my=0.6, r0=(0.04,) * 3),))
@@ -171,6 +175,7 @@ def test_objects_beyond_the_most_show_the_nearest_probe(
     assert set(shared_probes(store).values()) == {own} and own not in shared_probes(store)
 
 
+@pytest.mark.long
 def test_a_ball_before_a_distant_facade_has_its_own_probe(tmp_path: Path) -> None:
     """Outdoors, most mirrored rays end in the sky, which made a probe 60 m away seem near."""
     ground = patch((-3, 0, 3), (6, 0, 0), (0, 0, -6))

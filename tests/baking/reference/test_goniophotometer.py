@@ -38,6 +38,7 @@ def tables() -> dict[str, GonioTable]:
     return {name: measure(name, incident=brushed if "brushed" in name else COARSE, noise=0) for name in SPECIMENS}
 
 
+@pytest.mark.long
 def test_specimens_are_measured_and_written(tables: dict[str, GonioTable], tmp_path: Path) -> None:
     transmits = {"rough copper": False, "brushed aluminium": False, "varnished wood": False, "frosted glass": True}
     assert {name: table.info.transmits for name, table in tables.items()} == transmits

@@ -36,6 +36,7 @@ def test_a_lambertian_table_is_a_lambertian_ball():
     assert seen.measured[seen.ball].mean() == pytest.approx(0.3, abs=0.01)
 
 
+@pytest.mark.long
 def test_brushed_the_right_way():
     table = synthesise(BRUSHED, replace(ANISOTROPIC, phi_i_deg=(0, 30, 60, 90), **CLEAN))
     right = preview(table, BRUSHED, **SMALL).figures["flip_mean"]
@@ -44,6 +45,7 @@ def test_brushed_the_right_way():
     assert right < 0.12 and wrong > 1.5 * right
 
 
+@pytest.mark.long
 def test_a_lamp_shines_through():
     material = Material(name="paper", kd=0.3, lobes=(Lobe(side="transmission", k=0.6, mx=0.15, my=0.15, r0=0.0),))
     seen = preview(synthesise(material, replace(ISOTROPIC, **CLEAN)), material, **SMALL)
@@ -53,6 +55,7 @@ def test_a_lamp_shines_through():
     assert seen.figures["psnr_db"] > 25
 
 
+@pytest.mark.long
 def test_the_lamp_is_as_bright_as_the_environment_is_scaled(tmp_path):
     """One exposure serves lamp and environment: a scale of the environment that the lamp ignored would be seen."""
     rows = np.linspace(2.0, 0.2, 16)[:, None, None] * np.ones((1, 32, 3))

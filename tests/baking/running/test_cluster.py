@@ -88,6 +88,7 @@ def test_jobs_of_other_processes_go_through_several_passes() -> None:
     assert stages(5, together=True) == [[5]] and stages(20, together=True) == [[16], [20]]
 
 
+@pytest.mark.long
 def test_what_is_interrupted_keeps_its_tiles(alone: Store, tmp_path: Path) -> None:
     def stop(done: float, total: float, what: str) -> None:
         if "32 samples" in what and done == 2:
@@ -100,6 +101,7 @@ def test_what_is_interrupted_keeps_its_tiles(alone: Store, tmp_path: Path) -> No
     assert_same(baked(tmp_path / "s"), alone)
 
 
+@pytest.mark.long
 def test_terms_of_different_samples_begin_anew(alone: Store, tmp_path: Path) -> None:
     """A bake that died between the terms of a tile does not count samples twice."""
     store = baked(tmp_path / "s")
@@ -115,6 +117,7 @@ def test_terms_of_different_samples_begin_anew(alone: Store, tmp_path: Path) -> 
     assert np.array_equal(counts, before)  # the same paths, added up in one go
 
 
+@pytest.mark.long
 def test_a_worker_that_is_killed_is_survived(alone: Store, two: DaskWorkers, tmp_path: Path) -> None:
     calls = iter(range(1000))
 
@@ -186,6 +189,7 @@ def test_a_cluster_of_slow_and_dying_workers(tmp_path: Path, monkeypatch: pytest
     assert_same(found, baked(tmp_path / "alone"))
 
 
+@pytest.mark.long
 def test_a_job_that_kills_its_workers_is_given_up() -> None:
     dask = pytest.importorskip("dask", reason="Dask is not installed")
     with (

@@ -398,6 +398,7 @@ def test_a_change_of_the_environment(scene: Scene, keys: Keys, environment: Any,
     assert stale(before, after) == starting(before, SKY)
 
 
+@pytest.mark.long
 def test_kinds_of_environments_differ(scene: Scene, keys: Keys) -> None:
     computed = (ComputedEnvironment("gallery"), ComputedEnvironment("nave"))
     environments = (None, scene.environment, SunSky((0.0, 1.0, 0.0)), ConstantEnvironment((1.0, 1.0, 1.0)), *computed)

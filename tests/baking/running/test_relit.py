@@ -38,6 +38,7 @@ def picture(relit):
     return RelitView(Store.open(relit.place), view.camera, view.width, view.height).image()
 
 
+@pytest.mark.long
 def test_the_transport_of_the_view_stays(store):
     folder, view = store
     before = keys(folder)
@@ -51,6 +52,7 @@ def test_the_transport_of_the_view_stays(store):
     assert Store.open(folder).artefact(view.name("relighting", "spans")).shape[1] == 1281, "as finely as the store"
 
 
+@pytest.mark.long
 def test_edits_go_to_a_store_beside_it(store):
     folder, view = store
     before, scene = keys(folder), load_scene("builtin:teatray")

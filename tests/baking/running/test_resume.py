@@ -42,7 +42,7 @@ def keys(store: Store) -> dict[str, str]:
     return {a.name: a.key for a in store.artefacts()}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_killed_and_resumed_is_the_same_bit_for_bit(tmp_path: Path) -> None:
     """Killed in the path traced map; `test_light_groups_baked` interrupts the gathered one."""
     whole = bake(room_with_step(), tmp_path / "whole", quality=TILED, only=["light_map"])
@@ -88,6 +88,7 @@ def test_only_what_depends_on_a_change_is_baked_again(baked: tuple[Scene, Path])
     assert keys(bake(scene, path, quality=TINY, only=KINDS)) == before
 
 
+@pytest.mark.long
 def test_anew_on_request_is_the_same_and_another_seed_is_not(baked: tuple[Scene, Path], tmp_path: Path) -> None:
     scene, path = baked
     before, calls = arrays(Store.open(path)), list[str]()

@@ -60,6 +60,7 @@ cameras = [{{ name = "front", position = [0, 3, 0.1], target = [0, 0, 0] }}]
 """
 
 
+@pytest.mark.long
 def test_a_scene_named_for_the_path_tracer_is_traced_with_its_own_materials(tmp_path: Path, capsys) -> None:
     (tmp_path / "floor.obj").write_text(OBJ)
     recorded, other = tmp_path / "scene.toml", tmp_path / "other.toml"

@@ -3,6 +3,7 @@
 import io
 
 import numpy as np
+import pytest
 
 from lambent.baking.bake import bake
 from lambent.baking.running.watch import Watch
@@ -27,6 +28,7 @@ class Seen(Watch):
         self.regions.append((light.astype(np.float32), finished))
 
 
+@pytest.mark.long
 def test_regions_come_tile_by_tile_and_are_near_to_the_finished_map(mi, tmp_path):
     seen, scene = Seen(), load_scene("builtin:box")
     how = {"quality": IN_TILES, "only": {"light_map", "probe"}, "light_groups": "scene"}

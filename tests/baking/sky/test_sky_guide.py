@@ -124,6 +124,7 @@ def test_window_is_sampled_with_a_fraction_of_the_variance(lit_pit: tuple[SceneB
     assert variances[0] < 0.15 * variances[1]
 
 
+@pytest.mark.long
 def test_small_bright_sun_is_neither_lost_nor_an_explosion(tmp_path: Path) -> None:
     scene = pit(sunny(tmp_path))
     guided, plain = built(scene)[1], built(scene, guided=False)[1]

@@ -110,6 +110,7 @@ def test_textures_tint_what_passes_and_may_forbid_it() -> None:
     assert sun_of(spread).record.panes == () and not sunlit(spread, under((0.1, 0.1)))[1].any()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("glazing", ["two", "bowl", "frosted"])
 def test_paths_leave_out_what_shadow_rays_bring(tmp_path: Path, glazing: str) -> None:
     scene = room(glazing, environment=environment_file(tmp_path, disc(TOWARDS, 3.0, 300.0)))

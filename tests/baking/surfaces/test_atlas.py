@@ -60,6 +60,7 @@ def test_unwrapping_is_deterministic_and_survives_the_store() -> None:
         assert np.array_equal(first.uv2[old.name], again.uv2[old.name])
 
 
+@pytest.mark.long
 def test_a_large_smooth_mesh_is_unwrapped_in_pieces() -> None:
     ball = sphere(1.0, 192, 160)  # in one piece it brings the unwrapper down
     assert len(ball.faces) > 10 * PIECE_FACES

@@ -91,6 +91,7 @@ def extents(atlas: Atlas, finer: int = 1) -> Floats:
     return np.asarray(np.linalg.norm(high - low, axis=1))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["teapot", "torus", "balls", "slivers", "crossing", "builtin:pavilion"])
 def test_places_far_apart_share_no_texel(name: str) -> None:
     shapes = {"teapot": teapot, "torus": torus, "balls": balls, "slivers": slivers, "crossing": crossing}

@@ -43,6 +43,7 @@ def lamps() -> tuple[SceneObject, PointLight, DirectionalLight]:
     return glowing, PointLight((1.5, 1.0, 1.0), (1.0, 1.0, 1.0)), DirectionalLight((1.0, -2.0, 0.3), (0.1, 0.2, 0.1))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number, others", [(0, False), (1, True)])
 def test_points_get_the_same_light_with_less_noise(tmp_path: Path, number: int, others: bool) -> None:
     scene = suns(tmp_path)[number]
@@ -60,6 +61,7 @@ def test_points_get_the_same_light_with_less_noise(tmp_path: Path, number: int, 
         assert found.var(axis=0).sum() < 0.9 * former.var(axis=0).sum()
 
 
+@pytest.mark.long
 def test_sky_has_no_sun_and_lamps_stay(tmp_path: Path) -> None:
     glowing, point, weak = lamps()
     environment = environment_file(tmp_path, disc(TOWARDS, 2.0, 1000.0))

@@ -62,6 +62,7 @@ def looked_up(store, point: np.ndarray, name: str) -> float:
     raise AssertionError(f"{point} is not on {name}")
 
 
+@pytest.mark.long
 def test_light_from_above_the_ceiling_does_not_leak_down_the_wall(tmp_path: Path) -> None:
     store = bake(house(tmp_path), tmp_path / "s", quality=TINY.changed(geometry={"texels": 64}), only=["light_map"])
     inner = [np.array([x, SIDE - 1e-3, 0.0]) for x in np.linspace(0.1, 1.9, 13)]
@@ -83,6 +84,7 @@ def test_only_what_cameras_reach_is_seen(tmp_path: Path) -> None:
     assert not seen(traced, places[:0], points, normals).any()
 
 
+@pytest.mark.long
 def test_a_flush_poster_covers_its_wall_and_leaves_no_dark_border(tmp_path: Path) -> None:
     """Every ray meets the poster, grazing ones too; the wall beside it has the light of the furnace, pi."""
     bare = house(tmp_path)

@@ -137,6 +137,7 @@ def outdoors() -> View:
     return view(ball_on_floor(), environment_triangles(*environment(), 400))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("material", "counts"), [(GLOSSY, (256, 64)), (BRUSHED, (128, 64))])
 def test_bands_are_the_sum_over_the_triangles(outdoors: View, material: Material, counts: tuple[int, int]) -> None:
     """Within 1e-3 where the curve is made of steps, too; the steps themselves cost a little more."""

@@ -126,6 +126,7 @@ def test_the_backdrop_is_what_shines_by_itself(store: Store, scene: Scene) -> No
     assert (np.delete(seen, pixel, axis=0) >= 0.29).all()
 
 
+@pytest.mark.long
 def test_an_interrupted_bake_goes_on_and_ends_with_the_same_arrays(
     store: Store, scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -170,6 +171,7 @@ def test_textures_are_in_the_transport(tmp_path: Path) -> None:
     assert np.allclose(found, 0.5 * np.array([1.0, 0.5, 1.0]), rtol=0.01)
 
 
+@pytest.mark.long
 def test_a_material_that_the_view_does_not_show_has_empty_arrays(scene: Scene, tmp_path: Path) -> None:
     behind = SceneObject("behind", patch((-1, 0, 8), (1, 0, 0), (0, 1, 0)), "other")
     more = replace(scene, objects=(*scene.objects, behind), materials={**scene.materials, "other": GLOSSY})
@@ -182,6 +184,7 @@ def test_a_material_that_the_view_does_not_show_has_empty_arrays(scene: Scene, t
     assert np.isfinite(picture(store, 60, shown)).all()
 
 
+@pytest.mark.long
 def test_light_from_behind_shows_where_a_material_transmits(tmp_path: Path) -> None:
     """Under even light a sheet of kd = .3 and kt_d = .5 shows .8 of it; only its visibility has both sides."""
     sheet = SceneObject("sheet", patch((-9, 0, 9), (18, 0, 0), (0, 0, -18)), "sheet")
@@ -204,6 +207,7 @@ def test_transport_without_a_view_is_an_error(scene: Scene, tmp_path: Path) -> N
         bake(scene, tmp_path / "s", only={"transport"})
 
 
+@pytest.mark.long
 def test_small_bright_lamps_are_stored_as_exactly_as_large_ones(scene: Scene, tmp_path: Path) -> None:
     """Half floats are scaled by the light that arrives: a lamp that is 1000 times smaller may be a million brighter."""
     found = []

@@ -66,7 +66,7 @@ def assert_converged(of: Scene, spp: int) -> None:
 SUNNY = SunSky(sun_direction=tuple(normalize(np.array([0.7, 0.6, -0.2]))))  # type: ignore[arg-type]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_many_lights_are_the_light_itself() -> None:
     assert_converged(scene(SATIN, SUNNY), 4096)
 

@@ -63,6 +63,7 @@ def test_parts_of_the_bands_and_blocks_of_points_change_nothing(
     assert np.array_equal(parts.steps, whole.steps)
 
 
+@pytest.mark.long
 def test_long_steps_go_over_black_entries(outdoors: View) -> None:
     """Two sharp curves leave most pairs dark."""
     found = pairs_of(outdoors, BRUSHED, (256, 128))
@@ -143,6 +144,7 @@ HARD = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("camera", [None, EDGE_ON], ids=["above", "edge-on"])
 def test_hard_lights_are_the_sum_over_small_pieces(camera: Camera | None) -> None:
     """Each against brute force with 32^2 pieces, and none brings anything that is no number."""

@@ -68,6 +68,7 @@ def test_one_curve_has_the_lobes_of_every_roughness(lobe: Lobe, roughness: float
     assert np.allclose(found, expected, rtol=2e-3, atol=2e-4 * expected.max())
 
 
+@pytest.mark.long
 def test_roughness_varies_over_a_floor_as_path_traced(tmp_path: Path) -> None:
     """Half of the mean roughness on one side, one and a half on the other; the mean alone is far off."""
     textured = scene(GLOSSY, ImageEnvironment(sky(tmp_path, "sky.exr", 1)))
@@ -79,6 +80,7 @@ def test_roughness_varies_over_a_floor_as_path_traced(tmp_path: Path) -> None:
     assert all(np.abs(found[:, side] / mean[:, side] - 1).mean() > 0.01 for side in sides)
 
 
+@pytest.mark.long
 def test_bent_normals_are_lit_from_one_side_of_the_sheet() -> None:
     """A normal map of 45 degrees under even light: light from beyond the sheet does not count, as in the path tracer.
 
@@ -91,6 +93,7 @@ def test_bent_normals_are_lit_from_one_side_of_the_sheet() -> None:
     assert np.allclose(found, np.array(DULL.kd) * (1 + np.sqrt(0.5)) / 2, rtol=0.01)
 
 
+@pytest.mark.long
 def test_holes_show_and_light_what_lies_behind(mi: ModuleType) -> None:
     """A sheet half of which is cut away, over a black floor: its points are on one side, its shadow is half."""
     sheet = SceneObject("sheet", patch((-1, 1, 1), (2, 0, 0), (0, 0, -2)), "leaf")

@@ -21,6 +21,7 @@ def opened(folder, file, material=None, environments=()):
     return MaterialState.of(file, material, environments, Screen(folder))
 
 
+@pytest.mark.long
 def test_without_a_display(tmp_path):
     Material(name="plain", kd=0.5).save(tmp_path / "plain.json")
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}

@@ -29,6 +29,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(check_table, "INTEGRAL_THETA_DEG", (40.0,))
 
 
+@pytest.mark.long
 def test_a_model_by_name(lambent):
     outcome = lambent("check", "ward", "--set", "mx=0.1", "--set", "ks=0.2,0.4,0.9", "--json")
     assert outcome.code == 0
@@ -41,6 +42,7 @@ def test_a_model_that_fails(lambent):
     assert outcome.code == 1 and "without bound" in outcome.out
 
 
+@pytest.mark.long
 def test_a_measured_file(lambent, tmp_path, monkeypatch):
     monkeypatch.setattr(half_vector_resampling, "ISOTROPIC", GridShape(16, 1, 64, 32))
     setup = Setup((0.0, 30.0, 60.0), step_deg=10, fine_deg=5, noise=0.0, floor=0.0)
@@ -137,6 +139,7 @@ def test_inspect_and_fit_count_alike(lambent, spoilt):
     assert words in fitted.err and "a fit keeps them, and the cuberoot metric counts them as 0" in fitted.err
 
 
+@pytest.mark.long
 def test_check_finds_them_and_no_fault_in_them(spoilt):
     samples = load(spoilt).samples()
     report = check_table.check_table(load(spoilt), shape=GridShape(24, 1, 64, 32))
@@ -155,6 +158,7 @@ def tape(tmp_path_factory) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_inspect_says_how_a_table_is_looked_up(lambent, tape):
     facts = lambent("inspect", tape, "--json").json
     assert facts["reconstruction"]["way"] == "back_vector"
@@ -163,6 +167,7 @@ def test_inspect_says_how_a_table_is_looked_up(lambent, tape):
     assert given["reconstruction"] == {"way": "quadrilinear"}
 
 
+@pytest.mark.long
 def test_fit_takes_a_retro_lobe_or_leaves_it(lambent, tape, tmp_path):
     outcome = lambent("fit", tape, "-o", tmp_path / "tape.json")
     assert "a retro-reflective lobe removes" in outcome.err and "retro" in outcome.out

@@ -195,6 +195,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(module, "PHI_DEG", (0.0, 90.0))
 
 
+@pytest.mark.long
 def test_a_published_metal_passes_and_the_report_is_json():
     report = check(BRUSHED)
     assert report.passed and not report.warnings and report.reciprocity_error < 1e-9

@@ -88,6 +88,7 @@ def test_rank_3_turns_with_the_light(tmp_path: Path, small: Callable[[int], None
     within_tolerance(table.eval(wi, wo)[:, 0], f(wi, wo)[:, 0])
 
 
+@pytest.mark.long
 def test_the_peak_and_the_energy_are_kept(tmp_path: Path, small: Callable[[int], None]) -> None:
     """A lobe 7 degrees wide, along the mirror direction, where Klems patches lose two thirds of it."""
     small(16)
@@ -103,6 +104,7 @@ def test_the_peak_and_the_energy_are_kept(tmp_path: Path, small: Callable[[int],
     assert cost.verdict.word == "faithful" and cost.share["l2_ngan"] < 0.1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("rank", "log2_cells"), [(3, 11), (4, 13)])
 def test_an_unresolved_peak_keeps_its_energy_and_is_reported(
     tmp_path: Path, small: Callable[[int], None], rank: Rank, log2_cells: int
@@ -118,6 +120,7 @@ def test_an_unresolved_peak_keeps_its_energy_and_is_reported(
     assert cost.verdict.word == "unusable"
 
 
+@pytest.mark.long
 def test_a_peak_in_an_unusual_place_is_found(tmp_path: Path, small: Callable[[int], None]) -> None:
     """Light that goes back where it came from, which no lobe of the search expects, 4 degrees wide."""
 
@@ -160,6 +163,7 @@ def same_trees(one: Path, other: Path) -> bool:
     return same and before.keys() == after.keys()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rank", [3, 4])
 def test_trees_that_were_read_are_written_as_they_are(tmp_path: Path, rank: int) -> None:
     random = np.random.default_rng(rank)
@@ -185,6 +189,7 @@ def test_real_trees_come_back_and_radiance_agrees(shared_data: Path, tmp_path: P
         np.testing.assert_array_equal(answers[0][key], answers[1][key])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("material", [PLASTIC, BRUSHED], ids=["rank 3", "rank 4"])
 def test_radiance_reads_what_was_grown(tmp_path: Path, small: Callable[[int], None], material: Material) -> None:
     small(14)

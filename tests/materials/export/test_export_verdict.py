@@ -67,6 +67,7 @@ def test_exact_documents_are_kept_beside(tmp_path: Path):
     assert "retro&quot;:true" in (tmp_path / "tape.xml").read_text()
 
 
+@pytest.mark.long
 def test_gonio_text_keeps_the_peak(tmp_path: Path):
     cost = gonio_text.write(TAPE, tmp_path / "tape.txt")
     assert any("of the light" in line for line in cost.lost)
@@ -78,7 +79,7 @@ def test_gonio_text_keeps_the_peak(tmp_path: Path):
         np.testing.assert_allclose(table.eval(wi, wi), MaterialBSDF(TAPE).eval(wi, wi), rtol=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("writer", [merl, lbnl_xml], ids=lambda writer: writer.NAME)
 def test_coarser_formats_say_what_becomes_of_the_peak(writer, tmp_path: Path, monkeypatch):
     monkeypatch.setattr(merl, "SHAPE", (60, 30, 60))

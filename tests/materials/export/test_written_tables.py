@@ -189,6 +189,7 @@ def test_materials_stay_reciprocal(foil, mirror) -> None:
         np.testing.assert_allclose(table.eval(wi, wo), table.eval(wo, wi), rtol=2e-6)
 
 
+@pytest.mark.long
 def test_a_matrix_is_written_as_it_was_read(tmp_path: Path, hasty: None) -> None:
     """A matrix is constant over patches, so its means are its values, on both sides."""
     random = np.random.default_rng(1)
@@ -319,6 +320,7 @@ def test_klems_rings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_allclose(table.eval(wi, -wi), np.tile([0.1, 0.1, 0.2], (2, 1)) / np.pi, rtol=2e-5)
 
 
+@pytest.mark.long
 def test_klems_order_and_sides(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A formula without symmetry: each patch holds its value near the patch's middle, incident ones from phi + 180."""
     monkeypatch.setattr(lbnl_xml, "LOBES_LOG2", 8)

@@ -62,6 +62,7 @@ def test_half_of_a_fitted_lobe_lies_where_that_of_beckmann_does(fitted: tuple[Me
     np.testing.assert_allclose(widths(lobe), (lobe.mx, lobe.my), rtol=0.1)
 
 
+@pytest.mark.long
 def test_a_brushed_curve_lobe_keeps_its_ratio() -> None:
     setup = Setup(
         theta_i_deg=(0, 20, 40, 60), phi_i_deg=(0.0, 45.0, 90.0), symmetry="quadrant", step_deg=8.0, fine_deg=3.0,
@@ -72,6 +73,7 @@ def test_a_brushed_curve_lobe_keeps_its_ratio() -> None:
     assert lobe.mx / lobe.my == pytest.approx(3, rel=0.1)
 
 
+@pytest.mark.long
 def test_transmission_has_a_curve_and_no_diffuse_one() -> None:
     sheet = Material(kd=0.2, kt_d=0.3, lobes=(curve_lobe(mx=0.2, my=0.2, side="transmission"),))
     samples = measured(sheet)
@@ -81,6 +83,7 @@ def test_transmission_has_a_curve_and_no_diffuse_one() -> None:
     assert share(samples, found) < 0.03
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("coupled", [False, True])
 def test_a_coupled_diffuse_term_gets_no_curve(coupled: bool) -> None:
     material = Material(kd=0.5, lobes=TAILED.lobes, **({"kd_coupled": True} if coupled else {"kd_curve": KD_CURVE}))
@@ -89,6 +92,7 @@ def test_a_coupled_diffuse_term_gets_no_curve(coupled: bool) -> None:
     assert found.kd[0] == pytest.approx(0.5, rel=0.1)
 
 
+@pytest.mark.long
 def test_the_automatic_choice_is_by_tuples_held_out() -> None:
     plain = Material(kd=0.2, lobes=(Lobe(mx=0.2, my=0.2, r0=0.5),))
     kept = fit(measured(plain), lobes="auto")
@@ -114,6 +118,7 @@ def test_what_a_curve_cannot_keep_is_refused(options: dict[str, object], field: 
         call(table, lobes="curve", **options)
 
 
+@pytest.mark.long
 def test_alpha_and_kd_can_be_fixed() -> None:
     found = fit(measured(TAILED), lobes="curve", fix={"alpha": 0.1, "kd": (0.3, 0.2, 0.1)}).material
     assert found.kd == pytest.approx((0.3, 0.2, 0.1))

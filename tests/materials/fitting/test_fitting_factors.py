@@ -101,6 +101,7 @@ def cook_torrance(wi: Floats, wo: Floats) -> Floats:
     return np.asarray(model.eval(wi, wo))
 
 
+@pytest.mark.long
 def test_factors_of_cook_torrance_are_its_distribution_and_its_fresnel_factor() -> None:
     result = factorise(table_of(cook_torrance))
     sound(result)
@@ -189,6 +190,7 @@ def test_black_and_broken_tables_make_no_nan() -> None:
     assert not black.editable.eval(*pairs()).any()
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("coarse")
 def test_brushed_tables_keep_their_azimuth_in_the_remainder() -> None:
     material = Material(kd=0.1, lobes=(Lobe(mx=0.2, my=0.4, r0=0.5, k=0.6),))

@@ -249,7 +249,7 @@ def true_errors(samples, material):
 SHAPES = ("mx", "my", "alpha", "r0")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["white foil", "miro 5, two lobes"])
 def test_the_thesis_materials_are_recovered(name):
     material = KNOWN[name]
@@ -324,11 +324,13 @@ def test_progress_rises_to_its_end(paint):
     assert seen == sorted(seen) and seen[0] == 0 and seen[-1] == 1
 
 
+@pytest.mark.long
 def test_the_number_of_lobes_is_found(paint):
     assert len(fit(paint, lobes="auto").material.lobes) == 1
     assert len(fit(grey(TWO_LOBES, FEW), lobes="auto").material.lobes) == 2
 
 
+@pytest.mark.long
 def test_lobes_that_explain_nothing_are_not_added():
     flat = fit(grey(PAINT.model_copy(update={"lobes": ()}), replace(FEW, noise=0, floor=0)), lobes=4)
     assert len(flat.material.lobes) < 4

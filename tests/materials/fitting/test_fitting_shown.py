@@ -55,6 +55,7 @@ def test_albedo_of_an_incidence_ignores_gaps():
         assert entry.albedo(far=True)[0] == 0
 
 
+@pytest.mark.long
 def test_plots_are_written(tmp_path):
     paths = save_plots(grey(FOIL, FEW), FOIL, tmp_path, "table")
     assert [path.name for path in paths] == ["table_polar.png", "table_in_plane.png", "table_albedo.png"]
@@ -98,6 +99,7 @@ def test_slices_are_drawn(tmp_path):
     assert (tmp_path / "slices.png").stat().st_size > 10_000
 
 
+@pytest.mark.long
 def test_measurements_and_materials_are_drawn(tmp_path):
     """The plane of incidence of both, and the disks of the measurement: several incident directions, both sides."""
     plot_plane_of_incidence(tmp_path / "m.png", MaterialBSDF(FOIL).eval, "foil", title="foil", transmits=True)

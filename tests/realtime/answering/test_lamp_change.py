@@ -79,6 +79,7 @@ def test_light_answers_moved_lamps_as_a_bake_does(device: Any, stores: tuple[Sto
     assert answer.lit({}).is_baked
 
 
+@pytest.mark.long
 def test_a_lamp_brings_light_into_a_dark_room(device: Any, mi: Any, tmp_path: Path) -> None:
     """A ratio to the light as baked would leave it dark."""
     closed = scene()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
 PROBE = """
 import sys
 from wgpu.backends.wgpu_native._api import ffi
@@ -25,6 +27,7 @@ for form in ("{}", "{} *", "{}[3]", "const {} *"):
 """
 
 
+@pytest.mark.long
 def test_types_are_the_same():
     quick, slow = (
         subprocess.run([sys.executable, "-c", PROBE, how], capture_output=True, text=True) for how in ("quick", "slow")

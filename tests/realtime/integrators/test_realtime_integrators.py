@@ -47,6 +47,7 @@ def wo_of(camera: Camera, width: int, height: int) -> np.ndarray:
     return -pixel_rays(camera, width, height)
 
 
+@pytest.mark.long
 def test_white_furnace(device) -> None:
     """Under constant light every integrator returns the lobe's albedo."""
     renderer = Renderer(device, wall_scene(material((Lobe(mx=0.1, my=0.1),)), np.ones((6, 8, 8, 3))))
@@ -64,6 +65,7 @@ def test_white_furnace(device) -> None:
             np.testing.assert_allclose(image, albedo, rtol=0.1 + 0.8 * m)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", MATERIALS)
 def test_qmc_converges_to_the_integral(device, name: str) -> None:
     """z-test of every pixel and channel against Monte Carlo with the numpy material on the same cube map."""

@@ -75,6 +75,7 @@ def floor_under(lamp: IesLight, p: Floats) -> Floats:
 EDITS: list[LampEdit | None] = [None, LampEdit((-0.2, 1.4, 0.2), (0.1, -1.0, 0.0))]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("edit", EDITS, ids=["as baked", "moved"])
 def test_the_floor_has_soft_shadows(device: Any, store: Store, edit: LampEdit | None) -> None:
     renderer, lamp = Renderer(device, read_baked(store)), PANEL

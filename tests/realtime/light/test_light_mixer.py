@@ -66,6 +66,7 @@ def test_a_mix_is_the_weighted_sum(device: Any, scene: BakedScene, alone: dict[s
     assert image(device, scene, mix) == pytest.approx(expected, rel=5e-3, abs=2e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("integrator", ["lamps", "qmc"])
 def test_every_kind_of_cube_map_follows(device: Any, scene: BakedScene, integrator: str) -> None:
     """Half of all light is half the picture, by the integrators that read other cube maps and tables of lamps."""
@@ -77,6 +78,7 @@ def test_every_kind_of_cube_map_follows(device: Any, scene: BakedScene, integrat
     assert renderer.image(state) == pytest.approx(before, rel=6e-3, abs=2e-3), "and back"
 
 
+@pytest.mark.long
 def test_the_lamp_itself_dims(device: Any, scene: BakedScene) -> None:
     off = image(device, scene, {"lamp": DARK})
     on = image(device, scene, {})
@@ -84,6 +86,7 @@ def test_the_lamp_itself_dims(device: Any, scene: BakedScene) -> None:
     assert wall == pytest.approx(np.array([0.5, 0.4, 0.3]) + 0.25 * np.array([0.6, 0.55, 0.5]) * 2 / np.pi, rel=0.02)
 
 
+@pytest.mark.long
 def test_a_window_does_not_wait_and_shows_the_same_in_the_end(
     device: Any, scene: BakedScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:

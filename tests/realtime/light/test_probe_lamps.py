@@ -55,6 +55,7 @@ def rms(image: np.ndarray, truth: np.ndarray) -> float:
     return float(np.sqrt(np.mean((image - truth) ** 2)) / truth.max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name, lookup", [(name, "planes") for name in ("brushed", "ggx", "transmission", "retro")] + [("satin", "distance")]
 )
@@ -72,6 +73,7 @@ def test_small_lamps_are_those_of_the_cube_map(device, name: str, lookup: str) -
     assert rms(renderer.image(replace(state, integrator="rings")), truth) > 4 * error
 
 
+@pytest.mark.long
 def test_a_long_window_by_its_covariance(device) -> None:
     """A lobe of m = .4 under a tube 1.1 rad long; as a round lamp of the same radius it would be far off."""
     n = 64
@@ -91,6 +93,7 @@ def test_without_lamps_the_picture_is_that_of_rings(device, level: float) -> Non
     np.testing.assert_array_equal(smooth.image(STATE), smooth.image(replace(STATE, integrator="rings")))
 
 
+@pytest.mark.long
 def test_a_quarter_of_the_sky(device) -> None:
     """As large as a lamp can be: cut in pieces, or left in the cube map."""
     cube = lit((np.ones(3), 1.04, 1.0), rest=0.02)

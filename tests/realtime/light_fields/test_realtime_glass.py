@@ -85,6 +85,7 @@ def views(field: LightField) -> tuple[Place, np.ndarray, np.ndarray, np.ndarray]
     return place, mirror * [1, -1, 1], inside, uv2
 
 
+@pytest.mark.long
 def test_a_prism_shows_the_room_behind_it(device: Any, field: LightField) -> None:
     """By Snell's law and both faces' transmittance, from the room's own light; without glass it is elsewhere."""
     place, w, inside, uv2 = views(field)

@@ -64,6 +64,7 @@ def walls_from(centre: tuple[float, float, float], w: np.ndarray, lit: bool = Fa
     return light * brighter(np.array(centre) + t[..., None] * w) if lit else light
 
 
+@pytest.mark.long
 def test_light_follows_what_the_probe_sees_of_its_change(device: Any, renderer: Renderer, field: LightField) -> None:
     """As light fields that are taken again in the other light, and unlike the maps as they are."""
     as_baked = renderer.image(STATE)
@@ -87,6 +88,7 @@ def test_light_follows_what_the_probe_sees_of_its_change(device: Any, renderer: 
         np.testing.assert_allclose(moved.image(STATE), as_baked, rtol=1e-6)
 
 
+@pytest.mark.long
 def test_the_sky_follows_by_itself(device: Any, field: LightField) -> None:
     """Where the march ends in the sky: four times as bright, whatever the probe sees there."""
     open_field = replace(field, inverse_distance=0 * field.inverse_distance)
@@ -98,6 +100,7 @@ def test_the_sky_follows_by_itself(device: Any, field: LightField) -> None:
     np.testing.assert_allclose(bright.image(STATE)[SIZE // 2, SIZE // 2], (1.0, 0.5, 0.25), rtol=0.02)
 
 
+@pytest.mark.long
 def test_blocks_in_a_store_and_on_the_adapter(
     tmp_path: Path, device: Any, renderer: Renderer, field: LightField, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -64,6 +64,7 @@ def test_shader_and_numpy_agree_on_quarters_of_texels(device: Any, field: LightF
     assert np.quantile(error, 0.5) < 0.01 and np.quantile(error, 0.9) < 0.05, np.quantile(error, [0.5, 0.9, 0.98, 1])
 
 
+@pytest.mark.long
 def test_shader_and_numpy_agree_on_blocks(device: Any, field: LightField, monkeypatch: pytest.MonkeyPatch) -> None:
     """Quarters in patches, as at edges, and everywhere, so that the pool is too small for all mixed blocks."""
     if BLOCKS not in device.features:
@@ -102,6 +103,7 @@ def rough(device: Any, field: LightField) -> Renderer:
     return Renderer(device, plate_scene(field, ROUGH))
 
 
+@pytest.mark.long
 def test_filtered_samples_come_near_many(rough: Renderer, field: LightField) -> None:
     """Levels of the maps follow the solid angles of samples, as those of a probe."""
     many = rough.converged(replace(STATE, integrator="qmc"), 200)

@@ -55,6 +55,7 @@ def test_all_maps_within_the_budget_change_nothing(device: Any, scene: BakedScen
     assert roomy.streaming.statistics == {} and roomy.statistics["light_fields"] == {}
 
 
+@pytest.mark.long
 def test_a_view_gets_the_maps_that_it_needs(device: Any, scene: BakedScene) -> None:
     """Of half of the maps, those of the side that is seen: the picture is that of all maps."""
     exact, half = Renderer(device, scene), budgeted(device, scene, 44.5)

@@ -168,6 +168,7 @@ def test_bumps_from_afar_look_as_rough_as_they_are(device) -> None:
     np.testing.assert_allclose(got, expected, rtol=0.02)
 
 
+@pytest.mark.long
 def test_drawn_images_equal_path_traced_ones(device, mi, tmp_path) -> None:
     """All of a gloss at once - colour, roughness, bumps, brushing, a hole - under light from afar."""
     from lambent.baking.reference.path_traced import render_reference

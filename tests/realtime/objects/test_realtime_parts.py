@@ -107,6 +107,7 @@ def replace_kd(material: Material) -> Material:
     return material.model_copy(update={"kd": (0.3, 0.2, 0.1)})
 
 
+@pytest.mark.long
 def test_parts_are_mixed_in_a_planar_mirror(device: Any) -> None:
     """A mirror on the floor shows the shares that the wall has where its rays end."""
     scene = wall_in_parts(MIRROR)

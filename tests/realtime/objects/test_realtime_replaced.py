@@ -53,6 +53,7 @@ def irradiance(x: np.ndarray, n: np.ndarray) -> np.ndarray:
     return np.asarray(np.pi * seen(np.broadcast_to(x[:, None], w.shape), w, ball=False)[0].mean(axis=1))
 
 
+@pytest.mark.long
 def test_a_sphere_in_the_volume_mirrors_the_room(device: Any, field: LightField) -> None:
     """The bake's sphere, of other size and place in its file: as near to the truth as maps on its surface."""
     other = placed(sphere(7.0, 96, 48), (3.0, 1.0, -20.0))
@@ -68,6 +69,7 @@ def test_a_sphere_in_the_volume_mirrors_the_room(device: Any, field: LightField)
     assert error < 1.5 * usual and error < 0.4 * plain, (error, usual, plain)
 
 
+@pytest.mark.long
 def test_the_mesh_gets_the_irradiance_of_the_room(device: Any, field: LightField) -> None:
     """Of a box with flat faces: its light map is what rays gather at its place."""
     cube = box((1.0, 1.0, 1.0))

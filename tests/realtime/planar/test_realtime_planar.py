@@ -107,6 +107,7 @@ def test_a_sharp_mirror_shows_the_scene_from_the_mirrored_camera(device: Any, se
     assert (wrong_hand < 0.1).mean() < 0.8
 
 
+@pytest.mark.long
 def test_a_retro_lobe_takes_nothing_from_the_mirrored_view(device: Any) -> None:
     """Its light is the probe's, here dark: beside a mirroring lobe nothing changes, alone the floor is dark."""
     both = mirror(0.02)
@@ -237,6 +238,7 @@ def test_the_eye_lies_as_far_under_a_raised_floor_as_it_stands_over_it() -> None
     np.testing.assert_allclose(view.frame["eye"][:3], (0.4, 2 * 0.5 - 1.3, 3.0), atol=1e-6)
 
 
+@pytest.mark.long
 def test_the_light_map_scales_what_the_mirrored_view_does_not_hold(device: Any) -> None:
     """A floor that the probe's light does not reach looks as with a dark probe, beside its mirrored view as well."""
     scene = scene_of(mirror(0.2))
@@ -261,6 +263,7 @@ def constant(*values: float) -> Texture:
     return Texture(np.array(values, np.float16)[None, None])
 
 
+@pytest.mark.long
 def test_masked_reflectors_are_drawn_in_motion(device: Any) -> None:
     """Pixels that a masked planar reflector covers in part are blended as those of other masked surfaces."""
     opaque = np.random.default_rng(5).random((8, 8, 1)).astype(np.float16)

@@ -66,6 +66,7 @@ def test_glass_hides_nothing_and_what_stands_before_it_hides_it(device: Any) -> 
     np.testing.assert_allclose(middle(behind), middle(alone) * passed(RED, 1.0), rtol=0.01, atol=1e-4)
 
 
+@pytest.mark.long
 def test_a_mirror_shows_what_is_behind_glass(device: Any) -> None:
     """A mirror on the floor, looked at from the side, a glowing wall behind it, and glass between both."""
     wall = patch((-3, 0, -2), (6, 0, 0), (0, 4, 0))

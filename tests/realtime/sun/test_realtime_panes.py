@@ -66,6 +66,7 @@ def where(x: float, height: float) -> float:
 
 
 # Of glass the camera, at 1.9 m, is below: it sees the floor alone.
+@pytest.mark.long
 def test_floor_gets_what_panes_let_through(device: Any) -> None:
     count = 3
     panes = {f"pane_{i}": (pane(2.0 + 0.3 * i), "red" if i == 1 else "clear") for i in range(count)}
@@ -122,6 +123,7 @@ def stripes_at(height: float) -> tuple[Flags, Flags]:
     return turn < 1, np.abs(turn % 1 - 0.5) < 0.3
 
 
+@pytest.mark.long
 def test_textures_tint_what_panes_pass_and_cut_holes_in_them(device: Any) -> None:
     parts = {"pane": (pane(2.0), "clear")}
     left, sure = stripes_at(2.0)

@@ -90,6 +90,7 @@ def traced(points: Floats, radius_deg: float) -> Floats:
     return np.asarray((np.abs(at).max(axis=-1) < HALF).mean(axis=1).reshape(points.shape[:2]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("radius_deg", [0.27, 3.0])
 def test_penumbra_is_that_of_rays_to_the_disc(device: Any, radius_deg: float) -> None:
     found = drawn(device, scene({"floor": floor(), "plate": plate()}, radius_deg)) / TOWARDS[1]
@@ -101,6 +102,7 @@ def test_penumbra_is_that_of_rays_to_the_disc(device: Any, radius_deg: float) ->
     assert found.mean() == pytest.approx(expected.mean(), rel=0.01), "no light is lost or won"
 
 
+@pytest.mark.long
 def test_slats_in_the_penumbra_of_a_roof_leave_shadows_of_their_own(device: Any) -> None:
     """A wide sun behind the edge of a roof, and slats close to the floor: no one filter fits both penumbras."""
     roof = ((-4.0, HEIGHT, 4.0), (8.0, 0.0, 0.0), (0.0, 0.0, -4.3))
@@ -133,6 +135,7 @@ def past(patches: list[Any], points: Floats, radius_deg: float, eye: Floats | No
     return np.asarray(seen.mean(axis=1))
 
 
+@pytest.mark.long
 def test_penumbra_stays_sharp_over_a_plane_of_fifty_kilometres(device: Any) -> None:
     found = drawn(device, scene({"floor": floor(25e3), "plate": plate()}, 0.27)) / TOWARDS[1]
     expected = traced(places(DOWN), 0.27)
@@ -212,6 +215,7 @@ def test_blocks_know_the_least_and_the_greatest_depth_about_them() -> None:
         assert level.tolist() == [depths[1].min(), depths[1].max()]
 
 
+@pytest.mark.long
 def test_a_mirror_shows_sunlight_and_shadows(device: Any) -> None:
     """As the camera below the floor sees them: a wall with the shadows of a box and a ball on it."""
     sun = SunRecord(direction=tuple(normalize(np.array([0.3, 0.5, 0.8]))), irradiance=IRRADIANCE, radius_rad=0.005)

@@ -69,6 +69,7 @@ def traced(mi: Any) -> Floats:
     return render_reference(scene, CAMERA, SIZE, SIZE, 64, max_depth=1)[0].astype(float)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("integrator", ["lamps", "qmc"])
 def test_a_ball_half_in_the_shade_is_that_of_the_path_tracer(device: Any, traced: Floats, integrator: str) -> None:
     """With a probe in the shade, and with one that sees the disc, which must not count twice."""
@@ -93,6 +94,7 @@ def spread(image: Floats) -> float:
     return float((light * (place - mean) ** 2).sum())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("m", "radius_rad"), [(0.004, 0.02), (0.1, 0.03)])
 def test_a_disc_wider_than_the_lobe_at_rest(device: Any, m: float, radius_rad: float) -> None:
     """On a floor, against the mean of f cos_i over the disc; in motion the light is the same, if less sharp."""

@@ -52,6 +52,7 @@ def baked(
     return replace(found, irradiance=0 * found.irradiance, irradiance_back=back, sun=sun, unit=1.0)
 
 
+@pytest.mark.long
 def test_no_sun_gets_into_a_closed_room_of_sheets(tmp_path: Path, device: Any) -> None:
     """Walls and ceiling without thickness; a plane outside makes the texels of the shadow map 2 cm wide."""
     room = placed(turned_inwards(box((4, 3, 4))), (0, 1.5, 0))
@@ -62,6 +63,7 @@ def test_no_sun_gets_into_a_closed_room_of_sheets(tmp_path: Path, device: Any) -
     assert drawn(device, found, INSIDE, alone=True).max() == 0
 
 
+@pytest.mark.long
 def test_penumbras_are_not_cut(tmp_path: Path, device: Any) -> None:
     """Texels of the light map are larger than the penumbra of the opening, or smaller."""
     found = baked(tmp_path, {"floor": floor(), "plate": plate()}, 4.0, DOWN)
@@ -71,6 +73,7 @@ def test_penumbras_are_not_cut(tmp_path: Path, device: Any) -> None:
     assert np.array_equal(with_map[expected > 0], without[expected > 0])
 
 
+@pytest.mark.long
 def test_facets_of_a_ball_are_not_cut(tmp_path: Path, device: Any) -> None:
     """Texels are smaller than facets; some of these turn away from the sun where the ball does not."""
     middle = (0.0, 0.55, 0.0)
@@ -81,6 +84,7 @@ def test_facets_of_a_ball_are_not_cut(tmp_path: Path, device: Any) -> None:
     assert np.abs(with_map - without).max() < 0.02, ".09 where rays leave the facets"
 
 
+@pytest.mark.long
 def test_texels_hold_for_their_sun_and_geometry_alone(tmp_path: Path) -> None:
     found = baked(tmp_path, {"floor": floor(), "plate": plate()}, 1.0, DOWN)
     assert found.sunlit is not None and 0 < found.sunlit.mean() < 1
@@ -111,6 +115,7 @@ def test_places_that_are_no_numbers_count_as_lit() -> None:
     assert sunlit_faces(np.zeros((8, 8), np.uint8), uv2, np.array([[0, 1, 2]], np.uint32)).all()
 
 
+@pytest.mark.long
 def test_a_picture_is_the_same_to_the_bit_without_the_faces_that_get_no_sun(
     tmp_path: Path, device: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -69,6 +69,7 @@ def test_probes_that_know_distances_turn_and_the_sun_turns_too() -> None:
     assert under.probes["b"] is blind and under_turned_sky(scene, 360.0) is scene
 
 
+@pytest.mark.long
 def test_a_scene_turns_as_its_bake_does(mi: Any, tmp_path: Path) -> None:
     """The environment that a turned scene bakes is that of the scene, turned; all kinds of environment."""
     low_sun = SunSky(sun_direction=(0.0, 0.6, -0.8), sun_scale=0.0)

@@ -144,6 +144,7 @@ def test_textures_have_a_mean_of_one(scene: Scene) -> None:
         assert (texels * scene.materials[name].kd).max() < 0.9
 
 
+@pytest.mark.long
 def test_a_copy_of_its_file_is_the_same_scene(scene: Scene, tmp_path: Path) -> None:
     """Each .toml names its geometry, so that it may be copied anywhere and changed; a byte order mark is ignored."""
     for mark in ("", "\ufeff"):
@@ -204,6 +205,7 @@ def test_cornell_floor_gets_the_light_of_a_rectangle(mi: Any) -> None:
     assert np.abs(image.mean(axis=(0, 1)) - expected).max() < 5 * error.max() + 1e-4 * expected.max()
 
 
+@pytest.mark.long
 def test_the_loft_is_lit_through_its_windows_alone(mi: Any) -> None:
     """No light comes in where the windows are closed, whichever way it falls."""
     from lambent.baking.reference.path_traced import render_reference

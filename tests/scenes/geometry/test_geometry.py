@@ -201,6 +201,7 @@ def deviation(control: np.ndarray, steps: np.ndarray) -> float:
     return float(np.abs((away * bezier.normals(control, u, v)).sum(-1)).max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("tolerance", [0.05, 0.01])
 def test_tessellation_within_a_tolerance(tolerance: float) -> None:
     """Bulges of different size beside each other: patches get different steps, and still share their edges."""

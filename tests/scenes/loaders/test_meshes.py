@@ -137,6 +137,7 @@ def test_smoothing_groups_count_where_an_obj_has_them(tmp_path: Path, said: str,
     assert greatest_lean_deg(mesh) == pytest.approx(lean_deg, abs=2.0)
 
 
+@pytest.mark.long
 def test_thousands_of_faces_at_one_apex(tmp_path: Path) -> None:
     """Pairs of them would not fit into memory; the base of the cone stays hard, its side is smooth."""
     count = 40_000

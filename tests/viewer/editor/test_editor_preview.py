@@ -28,6 +28,7 @@ def mean(cube: np.ndarray) -> float:
     return float((cube * weight).sum() / (4 * np.pi))
 
 
+@pytest.mark.long
 def test_an_environment_is_scaled_to_one_mean_radiance(tmp_path: Path) -> None:
     preview = Preview()
     dim, bright = (preview.light(preview.add(sky_file(tmp_path, scale))) for scale in (0.01, 1000.0))

@@ -58,6 +58,7 @@ def test_the_borders_move_and_the_window_resizes(session):
     session.wait_for(lambda state: state["picture"][0] > narrower["picture"][0] and state["picture"][1] > before[1])
 
 
+@pytest.mark.long
 def test_save_and_close(session):
     """Last, because it closes the window of the tests before."""
     session.drag(session.point("mx", 0.5), session.point("mx", 0.3))

@@ -132,6 +132,7 @@ class FilmUnderWay:
         name = "tour.mp4"
 
 
+@pytest.mark.long
 def test_the_editor(monkeypatch, screen, tmp_path):
     BRASS.save(tmp_path / "brass.json")
     measured = write_measurement(tmp_path / "brass.txt", BRASS)

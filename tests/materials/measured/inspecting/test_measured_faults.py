@@ -26,6 +26,7 @@ from tests.materials.export.formula_table import FormulaTable
 from tests.materials.measured.measured_files import GLOSSY
 
 
+@pytest.mark.long
 def test_every_format_and_json(files: dict[str, Path]) -> None:
     for path in files.values():
         report = inspect_table(load(path))

@@ -103,6 +103,7 @@ def test_peaks_about_the_mirror_direction_keep_their_way():
     assert table.choice.way == "half_vector"
 
 
+@pytest.mark.long
 def test_the_way_is_given_where_a_file_is_read(tmp_path):
     file = tmp_path / "tape.txt"
     gonio_text.write(TAPES[2].measured(10.0), file)
@@ -122,6 +123,7 @@ def bsdf(request):
     return TableBSDF(request.param.measured(), SHAPE)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("theta_deg", [40.0, *(pytest.param(theta, marks=pytest.mark.slow) for theta in (0.0, 85.0))])
 def test_sampler_follows_its_density(bsdf, theta_deg):
     assert isinstance(bsdf.lookup, RetroGrid)

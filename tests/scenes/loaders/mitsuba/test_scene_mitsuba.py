@@ -225,6 +225,7 @@ def test_old_scales_and_a_checkerboard(tmp_path: Path) -> None:
     assert np.allclose(texture.texels[[0, -1, 0, -1], [0, -1, -1, 0], 0], [2, 2, 0, 0])
 
 
+@pytest.mark.long
 def test_sheets_masks_and_what_is_lost(tmp_path: Path) -> None:
     png(tmp_path / "leaf.png", [[[0, 255, 0, 255], [0, 0, 0, 0]]])
     body = """
@@ -349,6 +350,7 @@ def test_the_suns_radius_is_read(tmp_path: Path, said: str, radius_deg: float) -
     assert ("sun's radius" in notes) == (radius_deg in (0.05, 30.0))
 
 
+@pytest.mark.long
 def test_lamps_beside_a_sky_are_in_its_unit(tmp_path: Path) -> None:
     """Mitsuba's sky is in W/(sr m^2 nm): of equal light, both are as bright as before beside each other."""
     lamp = '<emitter type="point"><rgb name="intensity" value="2"/></emitter>'
@@ -372,6 +374,7 @@ def test_one_channel_of_a_bitmap(tmp_path: Path, channel: str, byte: int) -> Non
     assert kd == pytest.approx((byte / 255,) * 3, rel=2e-3)
 
 
+@pytest.mark.long
 def test_parameters_of_principled_are_kept_within_their_ranges(tmp_path: Path) -> None:
     def mirror(metallic: float, roughness: float) -> Material:
         made = f"""<bsdf type="principled" id="m"><rgb name="base_color" value="1 .5 .2"/>

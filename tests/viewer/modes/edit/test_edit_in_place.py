@@ -178,6 +178,7 @@ def former_edits(store, number, by):
     return file, Session.open(file).document
 
 
+@pytest.mark.long
 def test_edits_of_a_file_of_their_own_are_taken_once(store):
     former_edits(store, 1, 2.0)
     file, document = former_edits(store, 2, 3.0)

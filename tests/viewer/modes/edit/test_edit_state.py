@@ -291,6 +291,7 @@ def test_documents_and_tables_are_dropped(ready, tmp_path):
     assert len(bakes.begun) == 2
 
 
+@pytest.mark.long
 def test_a_measured_table_is_fitted_and_its_fit_is_a_step(ready, tmp_path):
     state, _ = ready
     table = write_measurement(tmp_path / "paper.astm", Material(kd=(0.6, 0.5, 0.4)))

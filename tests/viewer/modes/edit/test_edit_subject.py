@@ -96,6 +96,7 @@ def test_a_store_opens_under_the_light_that_it_was_baked_with(tmp_path, sky):
     assert other.store != tmp_path / "lit" and other.store_for(subject.lit_by) != other.store
 
 
+@pytest.mark.long
 def test_a_session_opens_with_its_view_and_all_materials(tmp_path):
     box = type(tmp_path)("builtin:teatray")
     first = opened(box, Screen(tmp_path), picture=(20, 10))
@@ -115,6 +116,7 @@ def test_a_session_opens_with_its_view_and_all_materials(tmp_path):
         opened(tmp_path / "gold.edits.json", Screen(tmp_path))
 
 
+@pytest.mark.long
 def test_merged_materials_and_hard_edges_last_with_the_session(tmp_path):
     subject = opened(type(tmp_path)("builtin:teatray"), Screen(tmp_path), crease_deg=40.0)
     assert subject.scene.crease_deg == 40

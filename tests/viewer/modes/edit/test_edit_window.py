@@ -21,6 +21,7 @@ def opened(open_window):
     return start
 
 
+@pytest.mark.long
 def test_a_scene_is_baked_edited_and_opened_again(opened, tmp_path):
     first = opened("builtin:teatray", tmp_path)
     assert first.state()["lights"] == 0 and first.state()["baking"], "the window is there at once"

@@ -35,6 +35,7 @@ def keys(store):
     return {artefact.name: artefact.key for artefact in Store.open(store).artefacts()}
 
 
+@pytest.mark.long
 def test_the_picture_is_that_of_the_view(opened, tray, sky, bakes):
     state = opened(tray)
     assert state.size == SIZE and np.array_equal(settled(state), expected(tray))
@@ -75,6 +76,7 @@ def test_a_drag_and_an_image_are_one_step_each(opened, tray, sky):
     assert np.array_equal(settled(state), expected(tray, turn_deg=30.0))
 
 
+@pytest.mark.long
 def test_the_sky_is_there_again(opened, tray, sky):
     state = opened(tray, environment={"path": sky, "scale": 2.0, "up": "+x"}, turn_deg=20.0)
     picture, wanted = settled(state), state.edits.sky
@@ -110,6 +112,7 @@ def test_a_sky_that_no_window_writes_is_refused(opened, gold_tray, said):
         read_session(gold_tray / FILE)
 
 
+@pytest.mark.long
 def test_edited_materials_are_baked_beside_the_store(opened, gold_tray, bakes):
     before, plain = keys(gold_tray), expected(gold_tray)
     state = opened(gold_tray)
@@ -131,6 +134,7 @@ def test_edited_materials_are_baked_beside_the_store(opened, gold_tray, bakes):
     assert len(bakes.begun) == 2, "and again after another edit"
 
 
+@pytest.mark.long
 def test_an_edit_meanwhile_stops_the_bake(opened, gold_tray, bakes):
     bakes.waits = True
     state = opened(gold_tray)
@@ -213,6 +217,7 @@ def test_a_store_that_does_not_know_its_scene_and_has_no_view_says_so(opened, tr
     assert settled(state) is None and "no path of its scene" in state.trouble and not bakes.begun
 
 
+@pytest.mark.long
 def test_a_room_without_a_sky_says_so_until_it_has_an_image(opened, baked_box, sky, bakes):
     (baked_box / FILE).unlink(missing_ok=True)
     bakes.waits = True

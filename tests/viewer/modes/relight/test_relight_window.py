@@ -42,7 +42,7 @@ def test_without_a_display_a_line_says_so(capsys, tray, monkeypatch):
     assert "no display; name a picture with -o" in capsys.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_stopped_bake_goes_on(tray):
     camera = load_scene("builtin:teatray").cameras[0]
     relit = Relit(tray, RoomState(), View(camera, 160, 120))
@@ -60,7 +60,7 @@ def test_a_stopped_bake_goes_on(tray):
     assert RelitView(Store.open(tray), camera, 160, 120).image().mean() > 0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_view_is_relit_in_its_window(open_window, tray, sky, tmp_path):
     window = open_window(tray, tmp_path, WINDOW, "relight")
     before = window.wait_for(lambda state: state.get("relit"))

@@ -76,6 +76,7 @@ def test_curves_are_smoothed_and_put_back(driver, state):
     assert edits.current("brass") == edits.scene["brass"]
 
 
+@pytest.mark.long
 def test_a_curve_is_copied_from_a_measurement(driver, state, tmp_path):
     rough = Material(name="rough", kd=0.05, lobes=(Lobe(mx=0.3, my=0.3, k=(0.9, 0.8, 0.5), r0=0.6),))
     write_measurement(tmp_path / "rough.txt", rough)

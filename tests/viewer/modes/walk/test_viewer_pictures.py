@@ -156,6 +156,7 @@ def film(pictures, state, name):
     drawn(pictures, state, SIZE)
 
 
+@pytest.mark.long
 def test_films_and_rows_of_pictures(renderer, state, tmp_path):
     pictures = Pictures(renderer, state)
     for name in ("a.mp4", "b-##.png", "c.exr"):

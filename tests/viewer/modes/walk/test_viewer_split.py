@@ -74,6 +74,7 @@ def alone(store, state, room):
     return pictures._a.read()
 
 
+@pytest.mark.long
 def test_each_side_is_its_state_and_both_follow_the_camera(pictures, state, store):
     edits = state.materials.edits
     edits.change("plaster", RED)
@@ -90,6 +91,7 @@ def test_each_side_is_its_state_and_both_follow_the_camera(pictures, state, stor
         assert np.abs(a - b).mean() > 0.1 * b.mean()
 
 
+@pytest.mark.long
 def test_an_exchange_takes_one_frame_and_computes_nothing(pictures, state):
     edits = state.materials.edits
     edits.change("plaster", RED)

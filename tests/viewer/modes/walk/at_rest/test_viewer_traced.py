@@ -180,6 +180,7 @@ def test_no_picture_of_another_exposure_is_blended(pictures, state):
         assert "before A" not in pictures.images
 
 
+@pytest.mark.long
 def test_what_is_edited_is_traced_and_drawn_over_the_traced_picture(pictures, state):
     """A black material in place of all takes the light that they scatter."""
     found = traced(pictures, state)
@@ -282,6 +283,7 @@ def test_beside_a_traced_b_the_picture_a_is_drawn(pictures, state):
     assert state.comparison.figures.of[0] == 0 < state.comparison.figures.of[1]
 
 
+@pytest.mark.long
 def test_light_follows_edits_as_baked_estimated_or_rebaked(renderer, store, state):
     """In the diffuse light and the lamp's, which drawing shows as well, in other materials than the store's."""
     red = {name: one.model_copy(update={"kd": (0.7, 0.1, 0.1)}) for name, one in state.scene.materials.items()}
@@ -316,6 +318,7 @@ def test_a_film_is_traced_frame_by_frame(pictures, state, tmp_path):
     assert first.shape == (360, 640, 3) and np.abs(first - last).mean() > 0.02 * first.mean()
 
 
+@pytest.mark.long
 def test_the_end_of_the_process_is_a_line_and_the_picture_is_drawn(pictures, state, workers):
     """Last, because it ends the process of the tests before."""
     traced(pictures, state)

@@ -91,6 +91,7 @@ def test_an_edit_drops_the_probes_of_the_one_before(store: Store, monkeypatch: p
     assert np.allclose(shown, fresh.image(VIEW), rtol=0.02, atol=0.01 * shown.mean())
 
 
+@pytest.mark.long
 def test_a_store_with_light_groups_answers_in_its_mix(tmp_path: Path) -> None:
     store = bake(room_with_step(), tmp_path / "s", quality=TINY, light_groups="scene")
     renderer, shown = Renderer(open_device(), store), Answering()

@@ -114,6 +114,7 @@ def test_regions_wait_for_what_the_map_holds_of_lamps(stores):
     assert part.layers({}, shown)[0] is shown[0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rebaked", [False, True])
 def test_the_picture_at_rest_has_the_edited_lamps(stores, rebaked):
     store, _, edits = stores

@@ -29,6 +29,7 @@ from tests.viewer.modes.walk.rebake.recorded_bakes import TILES, painted
 SIZE = (64, 48)
 
 
+@pytest.mark.long
 def test_the_copy_is_the_bake_of_the_edited_scene(boxes, store, tmp_path):
     """To the bit, since seeds and effort are the same."""
     scene, copy = load_scene("builtin:box"), Store.open(boxes["none"].recordings / "painted" / "copy")

@@ -114,6 +114,7 @@ def image_of(renderer, state, materials, light=()):
     return found
 
 
+@pytest.mark.long
 def test_an_edit_is_estimated_then_baked_then_exact(boxes, opened, store, tmp_path):
     flag = tmp_path / "go on"
     room = opened(then=boxes["none"].replays(flag))
@@ -140,6 +141,7 @@ def test_an_edit_is_estimated_then_baked_then_exact(boxes, opened, store, tmp_pa
     assert room.renderer.light_version == version and room.pictures.wait_s() is None, "then nothing goes on"
 
 
+@pytest.mark.long
 def test_another_edit_ends_it_and_undo_comes_back_without_a_bake(room):
     state, edits = room.state, room.state.materials.edits
     baked = image(room.renderer, state)
@@ -159,6 +161,7 @@ def test_another_edit_ends_it_and_undo_comes_back_without_a_bake(room):
     np.testing.assert_allclose(image(room.renderer, state), exact, rtol=1e-3, atol=1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("groups", ["none", "scene"])
 def test_a_state_that_goes_beside_keeps_its_light_and_undo_of_all_is_as_baked(opened, groups):
     room = opened(groups)
@@ -185,6 +188,7 @@ def test_a_state_that_goes_beside_keeps_its_light_and_undo_of_all_is_as_baked(op
     np.testing.assert_allclose(image(room.pictures._lane.renderer, state), baked, rtol=2e-3, atol=1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("groups", ["none", "scene"])
 def test_objects_whose_light_is_finished_go_over_while_others_are_baked(boxes, opened, tmp_path, groups):
     flag = tmp_path / "go on"
@@ -212,6 +216,7 @@ def test_objects_whose_light_is_finished_go_over_while_others_are_baked(boxes, o
     assert off < 0.5, "early light is near to the final one"
 
 
+@pytest.mark.long
 def test_light_of_an_edit_that_was_given_up_is_not_shown(boxes, opened, store, tmp_path):
     """A second edit comes while the first one's light goes in: nothing of the first stays."""
     flag = tmp_path / "go on"
@@ -251,6 +256,7 @@ def test_without_answers_an_edit_goes_from_as_baked_to_exact_and_back(room):
     np.testing.assert_allclose(image(room.renderer, state), baked, rtol=2e-3, atol=1e-5)
 
 
+@pytest.mark.long
 def test_mixes_of_light_groups_are_exact_too(boxes, opened):
     room = opened("scene")
     state = room.state
@@ -317,6 +323,7 @@ def test_faults_are_one_line_and_the_estimate_stays(opened, then, line):
     assert room.state.rebaking.line == "", "the light of the room as baked has no fault"
 
 
+@pytest.mark.long
 def test_the_worker_says_what_is_wrong_in_a_line(store, tmp_path):
     """The real process; the quality of this store has no name."""
     command = [sys.executable, "-m", f"{rebaking.__name__}_worker", str(store), str(tmp_path / "copy")]
@@ -327,6 +334,7 @@ def test_the_worker_says_what_is_wrong_in_a_line(store, tmp_path):
     assert "unknown quality" in said["error"] and process.returncode == 0
 
 
+@pytest.mark.long
 def test_the_worker_ends_with_the_window(store, tmp_path):
     """The end of stdin is that of a window that was killed; this bake would take minutes."""
     copy = tmp_path / "copy"

@@ -176,7 +176,7 @@ def test_a_view_starts_from_the_scene_where_the_room_is_as_baked(mode):
     assert view.state.session.material("red").now == of_scene
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_window_enters_a_view_and_returns(open_window, baked_box, tmp_path):
     for name in (FILE, "views.json"):
         (baked_box / name).unlink(missing_ok=True)

@@ -145,6 +145,7 @@ def test_only_finishes_in_sight_are_pictured(monkeypatch, state, geometry, scree
     assert 10 < len(asked) < 20
 
 
+@pytest.mark.long
 def test_pictures_of_finishes_reach_the_window(monkeypatch, state, geometry, screen):
     """A button shows its thumbnail once the window has made a texture of it."""
     state.screen.size = "design"
