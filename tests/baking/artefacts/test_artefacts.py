@@ -154,9 +154,9 @@ NAMES = (
     "probe/floor/planes",
 )
 PINNED = {
-    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 d5b58fb6 68037f7f 649a2624 c3ad556d",
-    ("normal", "photons", "traced"): "6161cd22 5095e777 c3dd8d8a 6e917429 3526a2be cd51ab56",
-    ("final", "photons", "traced"): "a38141f9 cef94a2c 95888972 addfa020 f405cebb 4e61597c",
+    ("preview", "paths", "cached"): "1dec1a65 4cae5d96 36f5ed71 fe73b0f0 d1633315 90888c20",
+    ("normal", "photons", "traced"): "6161cd22 5095e777 419cd75d fdbfba4a 8f8c51a2 95a1b3ef",
+    ("final", "photons", "traced"): "a38141f9 cef94a2c 2f43af1a 1b3e829a 2db161cb 20dcbc57",
 }
 
 
