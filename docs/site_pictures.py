@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import json
-import shutil
 import sys
 import threading
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Any
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
+from lambent.bench.card_rows.site import SOFTWARE, browser_program
 from lambent.core.views.camera import Camera, CameraPath
 from lambent.scenes.camera_paths import camera_at
 from lambent.site.serving import SiteServer
@@ -24,19 +24,15 @@ from lambent.store.contract import scene_record
 from lambent.store.store import Store
 
 PICTURES = Path(__file__).parent / "pictures"
-sys.path.insert(0, str(PICTURES.parents[1]))  # for the browser's flags, which the tests have
 SIZE, FILM = (1120, 630), (400, 225)
 STEPS, MS = 24, 200
 THING = 0.714, 0.74  # of the picture: what is clicked, the teapot
 
 
 def main(site: Path, store: Path) -> None:
-    from tests.site.conftest import FLAGS
-
-    program = shutil.which("chromium") or shutil.which("google-chrome")
     with SiteServer(site) as server, sync_playwright() as driver:
         threading.Thread(target=server.serve_forever, daemon=True).start()
-        browser = driver.chromium.launch(executable_path=program, args=list(FLAGS))
+        browser = driver.chromium.launch(executable_path=browser_program(), args=list(SOFTWARE))
         picture(browser, server.address)
         film(browser, server.address, scene_record(Store.open(store)).paths[0])
         browser.close()

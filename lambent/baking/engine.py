@@ -163,14 +163,21 @@ def _wanted_variants() -> tuple[str, ...]:
     return (wanted,) if wanted else VARIANTS
 
 
+def cuda_library() -> ctypes.CDLL | None:
+    """The library of the CUDA driver; None without one."""
+    try:
+        return ctypes.CDLL("nvcuda.dll" if sys.platform == "win32" else "libcuda.so.1")
+    except OSError:
+        return None
+
+
 @functools.cache
 def _cuda_driver() -> int | None:
     """Version number of the CUDA driver; None without one, which saves a probe that would fail."""
+    library, number = cuda_library(), ctypes.c_int()
     try:
-        library = ctypes.CDLL("nvcuda.dll" if sys.platform == "win32" else "libcuda.so.1")
-        number = ctypes.c_int()
-        return number.value if library.cuDriverGetVersion(ctypes.byref(number)) == 0 else None
-    except (OSError, AttributeError):
+        return number.value if library and library.cuDriverGetVersion(ctypes.byref(number)) == 0 else None
+    except AttributeError:
         return None
 
 

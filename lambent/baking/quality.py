@@ -9,6 +9,8 @@ from typing import Any
 
 from lambent.core.discovery import known
 
+MAX_DEPTH = 64  # surfaces on the longest path, mirrors included; in a white room (albedo .9), 16 lose 9 % of the light
+
 
 class QualityName(StrEnum):
     """Qualities; every kind of artefact has settings for each, but a draft changes those of a preview."""

@@ -134,8 +134,8 @@ def show(store: Path, folder: Path, minutes: float, seed: int, out: Path) -> Non
                 f"{self._hands.done.total()} actions, {len(self._hands.lost)} lost\n"
             )
 
-    window.Window = ScriptedWindow  # type: ignore[misc]
-    edit_state.EditState = partial(edit_state.EditState, lights=FEW_LIGHTS)  # type: ignore[misc, assignment]
+    window.Window = ScriptedWindow
+    edit_state.EditState = partial(edit_state.EditState, lights=FEW_LIGHTS)
     app.run(store, size=SIZE, folder=folder)
 
 

@@ -117,7 +117,8 @@ class Hands:
     def _place(self) -> tuple[float, float]:
         """A point of the picture."""
         x, y = self._random.uniform(0.1, 0.9, 2)
-        return self._window.screen.picture.point(x, y)  # type: ignore[no-any-return]
+        place: tuple[float, float] = self._window.screen.picture.point(x, y)
+        return place
 
     # actions of the walk
 
@@ -244,7 +245,10 @@ class Hands:
     def rebake(self) -> Frames:
         """Let the light of the edits be baked completely."""
         rebaking, start_s = self._mode.state.rebaking, time.monotonic()
-        ended = lambda: rebaking.exact or (not rebaking.line and time.monotonic() > start_s + 5)  # noqa: E731
+
+        def ended() -> bool:
+            return rebaking.exact or (not rebaking.line and time.monotonic() > start_s + 5)
+
         yield from self._until(ended, REBAKE_S)
         self.done["baked again"] += rebaking.exact
 

@@ -13,6 +13,7 @@ import pytest
 
 import lambent
 from lambent.baking.bake import bake
+from lambent.bench.card_rows.site import SOFTWARE, browser_program
 from lambent.core.views.camera import Camera
 from lambent.materials.document import Lobe, Material
 from lambent.scenes.geometry import box, patch, placed
@@ -24,13 +25,6 @@ from tests.baking.small_scenes import TINY, turned_inwards
 
 PAGE = Path(export.__file__).parent / "page"
 STILLS_PAGE = PAGE.with_name("stills_page")
-FLAGS = (
-    "--no-sandbox",
-    "--enable-unsafe-webgpu",
-    "--enable-features=Vulkan",
-    "--use-vulkan=swiftshader",
-    "--use-angle=swiftshader",
-)
 VIEWPORT = {"width": 320, "height": 240}
 
 
@@ -74,13 +68,12 @@ def box_site(adapter, blue_box, tmp_path_factory):
 def chromium():
     """Opens pages in Chromium with WebGPU on its software adapter."""
     api = pytest.importorskip("playwright.sync_api", reason="there is no playwright to drive a browser")
-    program = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-    if program is None:
+    if (program := browser_program()) is None:
         pytest.skip("there is no Chromium to open the site in")
     with api.sync_playwright() as driver:
 
         @contextmanager
-        def opened(flags=FLAGS, **options):
+        def opened(flags=SOFTWARE, **options):
             browser = driver.chromium.launch(executable_path=program, args=list(flags))
             try:
                 page = browser.new_page(viewport=VIEWPORT, **options)

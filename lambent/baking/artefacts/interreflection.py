@@ -100,9 +100,8 @@ def _bring(context: BakeContext, work: TileTracer, view: View, found: list[Part]
     shown = {material: [numbers[some] for some in slices(len(numbers), POINTS)] for material, numbers in mine.items()}
     tiles = [(part, tile) for part in found for tile in range(len(shown[part.material]))]
     behind = [one for one in tiles if _samples(context, *one) < samples]
-    behind.sort(
-        key=lambda one: -len(shown[one[0].material][one[1]])
-    )  # small ones last: no worker waits for a large one
+    # Small ones last: no worker waits for a large one.
+    behind.sort(key=lambda one: -len(shown[one[0].material][one[1]]))
     place = {part.names(tile)[0]: (part, tile) for part, tile in behind}
     what = f"interreflections, {samples} samples"
     context.progress(len(tiles) - len(behind), len(tiles), what)

@@ -14,7 +14,7 @@ import numpy as np
 
 from lambent.baking.context import BakeContext
 from lambent.baking.methods import LightMapMethod, sorts_light
-from lambent.baking.quality import QualityName
+from lambent.baking.quality import MAX_DEPTH, QualityName
 from lambent.baking.running.keys import group_inputs, key_of, light_inputs, material_inputs
 from lambent.baking.running.tiles import run_tiles
 from lambent.baking.surfaces.backs import backs_of
@@ -63,9 +63,11 @@ class Settings:
 
 
 SETTINGS = {
-    QualityName.preview: Settings((32, 32), 0.30, 64, gather_samples=128),
-    QualityName.normal: Settings((64, 192), 0.15, 64, gather_samples=512, photons_per_texel=512, gather_noise=0.04),
-    QualityName.final: Settings((256, 8192), 0.015, 64, photons_per_texel=4096),
+    QualityName.preview: Settings((32, 32), 0.30, MAX_DEPTH, gather_samples=128),
+    QualityName.normal: Settings(
+        (64, 192), 0.15, MAX_DEPTH, gather_samples=512, photons_per_texel=512, gather_noise=0.04
+    ),
+    QualityName.final: Settings((256, 8192), 0.015, MAX_DEPTH, photons_per_texel=4096),
 }
 
 

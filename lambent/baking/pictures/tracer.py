@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from lambent.baking.bsdfs.material_plugin import DIFFUSE_ATTRIBUTE, NORMAL_ATTRIBUTE, SPECULAR_ATTRIBUTE
 from lambent.baking.light.cache import LightMapCache
-from lambent.baking.pictures.gathering import MAX_DEPTH, Gathering
+from lambent.baking.pictures.gathering import Gathering
+from lambent.baking.quality import MAX_DEPTH
 from lambent.baking.running.tiles import slices
 from lambent.baking.tracing import path_tracer
 from lambent.baking.tracing.rays import block_sums, has_holes, intersect, rays_from

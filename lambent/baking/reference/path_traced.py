@@ -10,8 +10,8 @@ import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.baking.pictures.gathering import MAX_DEPTH
 from lambent.baking.pictures.tracer import Tracer, camera_rays
+from lambent.baking.quality import MAX_DEPTH
 from lambent.baking.running.tiles import seed_of
 from lambent.baking.tracing import path_tracer
 from lambent.baking.tracing.lights.emitters import balance_emitters

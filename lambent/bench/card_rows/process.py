@@ -23,6 +23,7 @@ from pathlib import Path
 from queue import Empty, Queue
 from typing import Any
 
+from lambent.baking.engine import VARIANT_VARIABLE
 from lambent.bench.card_rows.row import Absent, Row
 from lambent.core.errors import UserError
 
@@ -73,7 +74,7 @@ def figures(name: str, row: Row, effort: object, work: Path, limit_s: float) -> 
 def _started(name: str, row: Row, effort: object, work: Path, errors: Any) -> Iterator[subprocess.Popen[bytes]]:
     environment = dict(os.environ)
     if row.variant is not None:
-        environment["LAMBENT_VARIANT"] = row.variant
+        environment[VARIANT_VARIABLE] = row.variant
     process = subprocess.Popen(
         [sys.executable, "-m", __name__, name, str(work)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors,
         env=environment,

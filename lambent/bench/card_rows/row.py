@@ -10,11 +10,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from lambent.baking.engine import VARIANTS, cuda_library, engine
 from lambent.core.errors import UserError
 from lambent.core.machine import cpu_name
 
 THESIS_M, THESIS_E = "thesis M, GTS 450", "thesis E, one Xeon"
-CUDA, PROCESSOR = "cuda_ad_rgb", "llvm_ad_rgb"  # variants of the path tracer
+CUDA, PROCESSOR = VARIANTS
 NAME_BYTES = 256
 
 
@@ -67,23 +68,16 @@ def adapter_name() -> str:
 
 def engine_name() -> str:
     """The device that traces paths: the card of CUDA, or the processor."""
-    from lambent.baking.engine import engine
-
     return cuda_name() if engine().variant == CUDA else cpu_name()
 
 
 def cuda_name() -> str:
     """Name of the first CUDA device; raises `Absent` without one."""
-    for library in ("libcuda.so.1", "nvcuda.dll"):
-        try:
-            cuda = ctypes.CDLL(library)
-        except OSError:
-            continue
-        device, name = ctypes.c_int(), ctypes.create_string_buffer(NAME_BYTES)
-        if not cuda.cuInit(0) and not cuda.cuDeviceGet(ctypes.byref(device), 0):
-            cuda.cuDeviceGetName(name, NAME_BYTES, device)
-            return name.value.decode(errors="replace")
-    raise Absent("no CUDA device")
+    cuda, device, name = cuda_library(), ctypes.c_int(), ctypes.create_string_buffer(NAME_BYTES)
+    if cuda is None or cuda.cuInit(0) or cuda.cuDeviceGet(ctypes.byref(device), 0):
+        raise Absent("no CUDA device")
+    cuda.cuDeviceGetName(name, NAME_BYTES, device)
+    return name.value.decode(errors="replace")
 
 
 def median_ms(work: Callable[[int], object], count: int) -> float:

@@ -20,8 +20,9 @@ from lambent.site.serving import SiteServer
 from lambent.store.contract import scene_record
 
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
-COMMON = ("--no-sandbox", "--enable-unsafe-webgpu", "--enable-features=Vulkan", "--ignore-gpu-blocklist")
-FLAGS = ((*COMMON, "--use-angle=vulkan"), (*COMMON, "--use-vulkan=swiftshader", "--use-angle=swiftshader"))
+COMMON = ("--no-sandbox", "--enable-unsafe-webgpu", "--enable-features=Vulkan")
+HARDWARE = (*COMMON, "--ignore-gpu-blocklist", "--use-angle=vulkan")
+SOFTWARE = (*COMMON, "--use-vulkan=swiftshader", "--use-angle=swiftshader")  # the tests' and the docs', too
 FRAMES = """async ([camera, sizes, rounds, turn]) => {
   const { readManifest, Data } = await import("/loading.js"), { look } = await import("/camera.js");
   const { Frame } = await import("/frame.js"), { openDevice } = await import("/device.js");
@@ -74,15 +75,19 @@ def _browser() -> tuple[Any, str]:
         driver = importlib.import_module("playwright.sync_api")
     except ImportError as error:
         raise Absent("playwright is not installed: pip install playwright") from error
-    program = next(filter(None, map(shutil.which, PROGRAMS)), None)
-    if program is None:
+    if (program := browser_program()) is None:
         raise Absent(f"no browser: none of {', '.join(PROGRAMS)}")
     return driver, program
 
 
+def browser_program() -> str | None:
+    """Path of the first of PROGRAMS on this machine."""
+    return next(filter(None, map(shutil.which, PROGRAMS)), None)
+
+
 def _page(browsers: Any, program: str, address: str) -> tuple[Any, str]:
     """A page of the site with a WebGPU adapter, hardware if the browser finds one, and the adapter's name."""
-    for flags in FLAGS:
+    for flags in (HARDWARE, SOFTWARE):
         browser = browsers.chromium.launch(executable_path=program, args=list(flags))
         page = browser.new_page(bypass_csp=True)
         page.set_default_timeout(0)  # the row has a limit

@@ -164,7 +164,7 @@ class _Slow:
 
             return done
 
-        cluster._loaded = slow  # type: ignore[assignment]
+        cluster._loaded = slow
 
 
 @pytest.mark.long
