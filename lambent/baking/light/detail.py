@@ -2,7 +2,8 @@
 
 The filter carries light into gaps, and knows objects of few texels badly. Where it does, samples and filtered light are
 mixed by Wiener's rule, in proportion to the part of their squared difference that is not noise. Squares are relative to
-the light: otherwise a bright neighbour would decide for a dark gap.
+the light nearby: otherwise a bright neighbour would decide for a dark gap, and a dark room beside a bright one would
+have no detail.
 
 Two halves know the noise of rare bright paths badly: in a few of many texels such a path arrives in both.
 The mean square therefore counts as far as it exceeds its own standard error: not at all where one texel makes it, fully
@@ -18,7 +19,7 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.light.colour import luminance
 
 DOUBT = 4.0  # times their noise: smaller squared differences are noise, whose estimate has heavy tails
-DARK = 0.01  # relative to the mean light: lights below it are compared as if they had this much
+DARK = 0.1  # relative to the mean light nearby: darker light is compared as if it were this bright
 
 
 def with_detail(clean: Floats, noisy: Floats, variance: Floats, known: Flags, labels: Indices) -> Floats:
@@ -34,8 +35,8 @@ def with_detail(clean: Floats, noisy: Floats, variance: Floats, known: Flags, la
         Chart of each texel, -1 in gutters.
     """
     light = luminance(np.asarray(clean, np.float32))
-    least = max(DARK * float(light[known].mean()), 1e-12) if known.any() else 1.0
-    squared = np.maximum(light, least) ** 2
+    nearby = chart_means(light[..., None], known, labels)[0][..., 0]
+    squared = np.maximum(np.maximum(light, DARK * nearby), 1e-12) ** 2  # the least: black texels
     difference = luminance(np.asarray(noisy, np.float32)) - light
     square = difference**2 / squared
     parts = np.stack([square, square**2, np.asarray(variance, np.float32) / squared], axis=-1)

@@ -25,6 +25,15 @@ def test_a_gap_that_the_filter_fills_is_dark_as_sampled() -> None:
     assert found[:, 21:24].mean() < 0.05 and np.abs(found[:, 30:] - 1).max() < 0.5
 
 
+def test_a_gap_in_the_dark_is_found_beside_a_thousand_times_the_light() -> None:
+    light, filtered, labels = np.ones((48, 48)), np.ones((48, 48, 3)), LABELS.copy()
+    light[:, 20:25], filtered[:, 20:25] = 0.02, 0.3
+    light[:24], filtered[:24] = 1e-3 * light[:24], 1e-3 * filtered[:24]
+    labels[:24] = 1
+    found = with_detail(filtered, *sampled(light, 1), KNOWN, labels)
+    assert found[:24, 21:24].mean() < 0.05e-3 and found[24:, 21:24].mean() < 0.05
+
+
 def test_noise_stays_out() -> None:
     light = np.ones((48, 48))
     noisy, variance = sampled(light, 2)
