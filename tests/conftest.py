@@ -20,7 +20,7 @@ SHARED = Path(os.environ.get("LAMBENT_SHARED", Path(__file__).parents[2] / "shar
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--long", action="store_true", help="Run tests that take more than two seconds, too.")
+    parser.addoption("--long", action="store_true", help="Run tests that take more than a second, too.")
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

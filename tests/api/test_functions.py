@@ -35,6 +35,7 @@ def test_materials_files_and_models_are_checked(tmp_path):
             lambent.check(wrong, **values)
 
 
+@pytest.mark.long
 def test_a_material_is_written_in_another_format(tmp_path):
     paper = lambent.Material(Document(name="paper", kd=0.5))
     cost = lambent.convert(paper, tmp_path / "paper.bsdf", as_="rgl")

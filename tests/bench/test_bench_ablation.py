@@ -63,6 +63,7 @@ def test_a_place_that_is_not_there_is_named(place: str) -> None:
         pass
 
 
+@pytest.mark.long
 def test_switches_are_of_what_there_is() -> None:
     for switch in SWITCHES:
         assert not is_frozen(switch), switch

@@ -53,6 +53,7 @@ def test_callers_file_is_fitted_and_held_against_what_was_published(tmp_path):
     json.dumps(report)
 
 
+@pytest.mark.long
 def test_retro_reflectors_are_fitted_with_and_without_their_lobe():
     report = run(replace(QUICK, known=(), tapes=TAPES[:1], below_zero=False))
     without, with_it = report["rows"]

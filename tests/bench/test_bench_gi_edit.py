@@ -37,6 +37,7 @@ def test_rows_of_a_scene_and_of_its_series() -> None:
     json.dumps(report)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_settings_can_be_shown_without_a_new_bake(kind: str) -> None:
     glossy = Material(kd=(0.7, 0.6, 0.5), lobes=(Lobe(mx=0.1, my=0.2, r0=0.6),))

@@ -122,6 +122,7 @@ def test_the_polar_curve(lambent, downlight, tmp_path):
     assert columns.min() < 300 and columns.max() > 420, "both halves of the planes"
 
 
+@pytest.mark.long
 def test_the_unit_of_the_polar_curve(lambent, downlight, tmp_path):
     """cd/klm where the file relates to a flux, of which the numbers are then independent; else cd."""
     (tmp_path / "relative.ies").write_text(ies(numbers="1 2500 1"))

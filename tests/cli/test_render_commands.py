@@ -48,6 +48,7 @@ def test_still_in_every_format(lambent, store, tmp_path):
     assert shown["png"].mean() > 0.02
 
 
+@pytest.mark.long
 def test_false_colour_names_the_luminance(lambent, store, tmp_path):
     """The plaster of the small store has a luminance of kd E/pi everywhere: the picture says so in its colour."""
     file = tmp_path / "a.png"
@@ -59,6 +60,7 @@ def test_false_colour_names_the_luminance(lambent, store, tmp_path):
     assert lambent(*common, "--linear").code == 0, "the range is found"
 
 
+@pytest.mark.long
 def test_luminance_and_illuminance_by_their_names(lambent, store, tmp_path):
     """2 W/m2 arrive everywhere; --show names the quantity, and the view and the unit follow."""
     file = tmp_path / "a.png"
@@ -71,6 +73,7 @@ def test_luminance_and_illuminance_by_their_names(lambent, store, tmp_path):
             np.testing.assert_allclose(read_encoded(file)[-8, 20], expected, atol=0.01)
 
 
+@pytest.mark.long
 def test_exposure_as_ev100(lambent, store, tmp_path):
     common = ("render", store, "-o", tmp_path / "a.png", "--size", "32x24", "--force", "--json")
     assert lambent(*common, "--ev100", "9").json["ev100"] == pytest.approx(9)

@@ -185,6 +185,7 @@ BEFORE = "raise RuntimeError('a bug')"
 FULL = "dropped()\n    raise OSError(28, 'no space', 'a.png')"
 
 
+@pytest.mark.long
 @posix
 @pytest.mark.parametrize(
     ("body", "code", "said"),

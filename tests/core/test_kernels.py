@@ -76,6 +76,7 @@ def test_four_threads_at_once_compute_the_bits_of_one_after_the_other(layer: str
     assert ended.stdout.strip() == layer or layer == "default"
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the system does not fork")
 def test_a_forked_process_does_not_wait_for_a_thread_that_it_lacks() -> None:
     assert run(FORK, "workqueue").returncode == 0

@@ -39,6 +39,7 @@ def matrix(transport: Sparse, bands: tuple[int, int]) -> np.ndarray:
     return whole
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("bands", [(16, 8), (8, 64), (256, 4)])
 @pytest.mark.parametrize("edited", [0, 1])
 def test_folding_is_the_product_with_the_idle_curve(bands: tuple[int, int], edited: int) -> None:
@@ -156,6 +157,7 @@ def test_the_first_number_may_be_far_too(channel: int) -> None:
     assert light.largest == 8
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scale", [1e-4, 1.0, 3e3])
 def test_rows_of_very_bright_light_are_the_sums_of_its_entries(scale: float) -> None:
     """Four tails in two cells, eight bands in two rows; half floats end at 65504."""

@@ -59,6 +59,7 @@ def test_blender_accepts_the_package(blender, tmp_path):
     assert said.returncode == 0, said.stdout + said.stderr
 
 
+@pytest.mark.long
 def test_what_the_user_can_mend_is_one_line(blender, tmp_path):
     said = blender("extension", "refusals", tmp_path, "lambent")
     assert "has nothing to export: no mesh is visible in renders" in said["empty"] and not said["written"]
@@ -69,6 +70,7 @@ def test_what_the_user_can_mend_is_one_line(blender, tmp_path):
     assert all("\n" not in line for name, line in said.items() if name not in ("notes", "written"))
 
 
+@pytest.mark.long
 def test_bake_and_walk_run_in_the_background(blender, tmp_path):
     said = blender("extension", "jobs", tmp_path, stand_in(tmp_path))
     store, scene = str(tmp_path / "box.store"), str(tmp_path / "box.lambent/scene.toml")
@@ -82,6 +84,7 @@ def test_bake_and_walk_run_in_the_background(blender, tmp_path):
     assert [words[0] for words in asked(tmp_path)] == ["bake", "walk", "bake", "bake"]
 
 
+@pytest.mark.long
 def test_panels_offer_what_there_is(blender, tmp_path):
     found = blender("extension", "panels", tmp_path, stand_in(tmp_path))
     assert found["shown"] == {

@@ -109,7 +109,7 @@ def test_scaling_a_shape_changes_nothing() -> None:
         )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("theta_deg", [0.0, 50.0, 85.0, 130.0])
 @pytest.mark.parametrize("name", MATERIALS)
 def test_samplers_follow_their_density(name: str, theta_deg: float) -> None:

@@ -36,7 +36,7 @@ MIXTURES = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("theta_deg", [0.0, 50.0, 85.0, 130.0], ids=["normal", "oblique", "grazing", "from below"])
 @pytest.mark.parametrize("name", MIXTURES)
 def test_samplers_of_mixtures_follow_their_density(name, theta_deg):

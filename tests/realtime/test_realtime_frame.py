@@ -59,6 +59,7 @@ def test_sky_shows_the_cube_map_unmirrored(device) -> None:
         np.testing.assert_allclose(image, smooth_light(pixel_rays(camera, 24, 18)), rtol=0.02)
 
 
+@pytest.mark.long
 def test_reflections_meet_at_the_edges_of_cube_faces(device) -> None:
     """Rough reflections of smooth light are smooth: no seam where MIP levels of neighbouring faces meet."""
     gloss = Material(name="m", lobes=(Lobe(mx=0.25, my=0.25, r0=1.0),))

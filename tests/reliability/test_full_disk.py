@@ -113,7 +113,7 @@ def refused(error: str, folder: Path) -> None:
     assert error.count("\n") == 0 and SAYS.search(error) and str(folder) in error and ".lambent-" not in error, error
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("disk", ["limit"], indirect=True)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_commands(

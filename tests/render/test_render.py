@@ -37,6 +37,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_small_store(tmp_path_factory.mktemp("render") / "small.store")
 
 
+@pytest.mark.long
 def test_a_camera_by_name_by_itself_or_the_first(store: Path, tmp_path: Path) -> None:
     stills = {name: tmp_path / f"{name}.exr" for name in ("first", "front", "side", "itself")}
     still(store, stills["first"], settings=SMALL)
@@ -64,6 +65,7 @@ def test_a_film_along_any_path(store: Path, tmp_path: Path) -> None:
         film(store, tmp_path / "a.hdr", path, SMALL)
 
 
+@pytest.mark.long
 def test_a_fitted_scale_is_kept(store: Path) -> None:
     """The second camera of a film sees another range of luminances: its colours have to mean the same."""
     opened, settings = Store.open(store), Settings(96, 64, view="false-colour")
@@ -114,6 +116,7 @@ def test_nonsense(store: Path, change: dict, word: str) -> None:
         images(Store.open(store), replace(SMALL, **change))
 
 
+@pytest.mark.long
 def test_exposure_in_stops_is_the_scenes_unless_told(tmp_path: Path) -> None:
     """Linear light, encoded: one stop doubles it. Without an exposure that of the scene counts."""
     opened = Store.open(write_small_store(tmp_path / "s"))

@@ -30,6 +30,7 @@ def baked(adapter: None, store: Path) -> np.ndarray:
     return read_image(store.parent / "baked.exr")
 
 
+@pytest.mark.long
 def test_a_still_takes_a_mix(store: Path, baked: np.ndarray, tmp_path: Path) -> None:
     still(store, tmp_path / "a.exr", "front", DIMMED)
     assert read_image(tmp_path / "a.exr") == pytest.approx(baked / 2, rel=6e-3, abs=2e-3)
@@ -59,6 +60,7 @@ def test_the_light_of_a_film_changes_with_its_time(adapter: None, store: Path, t
     assert shares == pytest.approx([1, 0.75, 0.5, 0.25, 0, 0], abs=0.01)
 
 
+@pytest.mark.long
 def test_what_cannot_be_dimmed_is_said(adapter: None, store: Path, tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"unknown light group.*lamp, sky, sun"):
         still(store, tmp_path / "a.exr", "front", Settings(8, 8, light=parse_light(["lomp=off"])))

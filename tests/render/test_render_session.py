@@ -122,6 +122,7 @@ def test_a_drawn_picture_is_the_windows_to_the_bit(window: WalkMode, store: Path
     assert np.abs(baked - shown).mean() > 0.1 * shown.mean(), "the edits are seen"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("part", ["lamps", "textures", "materials", "light"])
 def test_every_kind_of_edit_counts(window: WalkMode, store: Path, part: str) -> None:
     settings, _ = left(window, store)
@@ -148,6 +149,7 @@ def test_a_traced_picture_is_that_of_the_window_at_rest(window: WalkMode, store:
     assert np.array_equal(found, picture.mean())
 
 
+@pytest.mark.long
 def test_light_that_does_not_follow_stays(window: WalkMode, store: Path) -> None:
     window.state.answering.on = False
     frame = settled(window)

@@ -84,6 +84,7 @@ def test_speed_is_constant_though_the_keys_are_not_evenly_spaced() -> None:
     assert path_length(PATH) == pytest.approx(steps.sum(), rel=1e-3)
 
 
+@pytest.mark.long
 def test_it_passes_the_keys_smoothly() -> None:
     positions = np.array([sample_path(PATH, t).position for t in np.linspace(0, 1, 2001)])
     for key in KEYS:

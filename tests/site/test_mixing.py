@@ -112,7 +112,7 @@ def halves(site, piece, size) -> np.ndarray:
     return np.frombuffer(unpacked(site, piece), np.float16).astype(np.float32).reshape(size)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_parts_add_up_to_each_state_as_exported(lit):
     """Of textures and numbers, in the store's light, with red walls, and in the evening."""
     names = lit.manifest["lightGroups"]
@@ -188,7 +188,7 @@ def assert_is_sum(lit, mix, loaded: set[int], content: bytes) -> None:
     assert np.abs(np.frombuffer(content, np.int16).reshape(-1, 4) - wanted).max() <= 1
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_sliders(chromium, lit):
     """By keys and reset; parts are fetched at the first move; states set them."""
     with chromium() as page, served(lit.site) as address:

@@ -68,6 +68,7 @@ def unused():
 """
 
 
+@pytest.mark.long
 def test_tests_of_its_room_catch_a_defect_or_do_not(plant, tmp_path, monkeypatch):
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")  # so that pytest starts sooner
     root = tmp_path / "root"

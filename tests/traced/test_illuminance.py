@@ -81,6 +81,7 @@ LAMPS = {
 }  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", LAMPS)
 def test_a_lamp_in_a_black_room_obeys_inverse_square_and_cosine(tmp_path: Path, kind: str) -> None:
     text, candela = LAMPS[kind]
@@ -94,6 +95,7 @@ def test_a_lamp_in_a_black_room_obeys_inverse_square_and_cosine(tmp_path: Path, 
     assert lux_from((0.4, 2.6, -0.3), grid.points, grid.normal, candela).max() > 100
 
 
+@pytest.mark.long
 def test_a_sky_and_a_sun_of_known_illuminance(tmp_path: Path) -> None:
     """Above an open black plane: pi L upright, half of that on a wall, and the sun by its cosine."""
     points = np.array([[0.0, 0.0, 0.0], [0.3, 1.5, -0.4]])
@@ -105,6 +107,7 @@ def test_a_sky_and_a_sun_of_known_illuminance(tmp_path: Path) -> None:
     assert upright / LM_PER_W == pytest.approx(np.pi / 2 + 2 * 0.6, rel=0.01), "the ground fills the lower half"
 
 
+@pytest.mark.long
 def test_points_on_surfaces_and_in_the_air_have_the_light_of_whole_paths(room: TracedRoom) -> None:
     """With a lamp of some size, a point light, mirrored light and shadows; the map is that of a preview."""
     for normal in (UP, np.array([0.0, 0.0, 1.0])):
@@ -115,6 +118,7 @@ def test_points_on_surfaces_and_in_the_air_have_the_light_of_whole_paths(room: T
         assert lx.mean() == pytest.approx(true.mean(), rel=0.01) and lx.max() > 3 * lx.min()
 
 
+@pytest.mark.long
 def test_an_eye_in_a_fisheye_has_the_illuminance_of_a_point_that_faces_its_view(tmp_path: Path) -> None:
     """Of lamps with a surface: what `lambent glare` calls illuminance at the eye, from a picture."""
     scene = replace(lit_room(), lights=())
@@ -131,6 +135,7 @@ def test_an_eye_in_a_fisheye_has_the_illuminance_of_a_point_that_faces_its_view(
     assert glare(around.image(), view).illuminance_lx == pytest.approx(float(lx[0]), rel=0.015)
 
 
+@pytest.mark.long
 def test_a_mix_of_lamps_is_the_sum_of_their_light(room: TracedRoom) -> None:
     off, found = (0.0, 0.0, 0.0), {}
     for name, factors in (("all", {}), ("bulb", {"lamp": off}), ("lamp", {"bulb": (0.5, 0.5, 0.5)}), ("dark", None)):
@@ -141,6 +146,7 @@ def test_a_mix_of_lamps_is_the_sum_of_their_light(room: TracedRoom) -> None:
     np.testing.assert_allclose(found["lamp"] + found["bulb"] / 2, found["all"], rtol=0.015)
 
 
+@pytest.mark.long
 def test_the_stated_error_is_that_of_the_result(room: TracedRoom) -> None:
     true, _ = room.illuminance(PLACES, UP, 0.001)
     lx, error_lx = room.illuminance(PLACES, UP, 0.03)
@@ -149,6 +155,7 @@ def test_the_stated_error_is_that_of_the_result(room: TracedRoom) -> None:
     assert (error_lx <= 0.03 * lx).all() and np.abs(off).min() > 0
 
 
+@pytest.mark.long
 def test_points_within_furniture_are_none(tmp_path: Path) -> None:
     """Of a floor with a chest and a ball; an open sheet is no solid, and a point on the chest is not in it."""
     objects = (

@@ -88,6 +88,7 @@ def test_a_furnace_has_radiance_1(tmp_path: Path) -> None:
         assert np.abs(picture.mean() - 1).max() < 0.25
 
 
+@pytest.mark.long
 def test_gathered_light_is_that_of_whole_paths(room: TracedRoom, paths: TracedRoom) -> None:
     (found, one), (true, other) = brightness(room), brightness(paths, path=True)
     assert np.abs(found - true).max() < 0.02 * true.max(), "the map's error, seen by one more bounce"

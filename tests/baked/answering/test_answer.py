@@ -43,6 +43,7 @@ def albedos(seed: int = 5) -> Albedos:
     return Albedos(rng.random((4, 3)) * 0.6, rng.random((4, 3)) * 0.3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("paired", [False, True])
 @pytest.mark.parametrize("groups", [1, 2, 6])
 def test_the_solution_is_that_of_the_linear_system(paired: bool, groups: int) -> None:
@@ -93,6 +94,7 @@ def padded(light: np.ndarray) -> np.ndarray:
     return side_by_side(np.moveaxis(light, 0, 1))
 
 
+@pytest.mark.long
 def test_gathering_sums_what_rays_end_on() -> None:
     rng = np.random.default_rng(0)
     point, weight = rng.integers(0, MOST_POINTS, (5, 64)), rng.random((5, 64)) * 2
@@ -103,6 +105,7 @@ def test_gathering_sums_what_rays_end_on() -> None:
     assert np.allclose(gathered(Rays.of(rays), padded(light))[..., :3], rays_of_light(weight, point, light), rtol=0.03)
 
 
+@pytest.mark.long
 def test_steps_of_weights_add_no_light_and_take_none() -> None:
     """Every weight alike: sums of many are right, whatever lies between two steps."""
     point = np.tile(np.arange(256), (64, 1))
@@ -125,6 +128,7 @@ def test_rays_that_end_at_one_point_are_one(groups: int) -> None:
     assert np.allclose(gathered(merged, padded(light))[..., :3], rays_of_light(weight, point, light), rtol=0.08)
 
 
+@pytest.mark.long
 def test_points_send_the_light_of_both_their_sides() -> None:
     light = np.array([[[10.0] * 3, [4.0] * 3]], np.float32)
     points = Points(np.zeros(2, int), np.zeros(2, int), np.array([1, 0]), np.float32(0.5) * light, light)
@@ -154,6 +158,7 @@ def furnace(light: float) -> Answer:
     return Answer(room, points, Rays.of(rays), near, near, direct, light * direct, grey(0.5))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("albedo", [0.0, 0.25, 0.8])
 def test_two_points_in_a_furnace_have_the_light_of_its_series(albedo: float) -> None:
     """All light is 1 / (1 - a)."""
@@ -254,6 +259,7 @@ def test_darker_walls_make_all_of_the_room_darker() -> None:
     assert (found < answer.baked).all() and (found >= answer.direct - 1e-6).all()
 
 
+@pytest.mark.long
 def test_a_probe_sees_both_states_of_both_sides() -> None:
     rng = np.random.default_rng(2)
     groups, lit, seen, size = 3, 20, 50, 80

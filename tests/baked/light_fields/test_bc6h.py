@@ -35,6 +35,7 @@ def psnr_db(light: np.ndarray) -> float:
     return float(10 * np.log10(light.max() ** 2 / np.mean(error**2)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("light", "least_db"), [(LINE, 55), (TURNING, 45), (EDGE, 55)], ids=["line", "turning", "edge"]
 )

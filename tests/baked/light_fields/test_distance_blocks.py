@@ -29,6 +29,7 @@ def off(inverse: np.ndarray, cover: np.ndarray | None = None) -> np.ndarray:
     return np.asarray(np.abs(found[0] / inverse - 1))
 
 
+@pytest.mark.long
 def test_surfaces_stay_where_they_are() -> None:
     """Planes to a step of 1/7 of a block at most; edges, which have entries of the pool, to the steps of a code."""
     assert off(FLOOR)[8:].max() < 0.02, "far from the horizon"

@@ -82,6 +82,7 @@ def test_every_group_answers_as_a_bake_of_the_other_colour(store: Store, scene: 
         assert off < 0.25 * stale
 
 
+@pytest.mark.long
 def test_light_answers_on_the_gpu_as_in_a_new_scene_and_comes_back(store: Store, scene: BakedScene) -> None:
     device = open_device()
     renderer, light = Renderer(device, scene), AnsweredLight(scene, read_answer(store))

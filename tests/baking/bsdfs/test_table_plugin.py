@@ -122,6 +122,7 @@ def test_samples_of_patches_weigh_the_albedo(mi, patches):
     assert (f > 0)[kept].mean() > 0.999
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("lookup", "theta_deg"), [("sheet", 50), ("sheet", 120), ("patches", 3), ("patches", 120)])
 def test_samples_follow_the_density(request, lookup, theta_deg):
     """Patches in cells along their borders."""

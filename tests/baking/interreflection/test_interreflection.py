@@ -97,6 +97,7 @@ def of_scene(scene: Scene) -> dict[str, Editable]:
     return {name: of_material(material) for name, material in scene.materials.items()}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("grey", [0.5, 1.0])
 def test_a_furnace_adds_the_same_light_at_every_bounce(tmp_path: Path, grey: float) -> None:
     """E a^(N - 1) arrives over N surfaces: exactly, path by path, but for the balance of the two ways."""

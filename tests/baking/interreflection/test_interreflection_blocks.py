@@ -107,6 +107,7 @@ def test_many_samples_are_traced_for_few_points_at_once(monkeypatch: pytest.Monk
             assert sums.light[surfaces == hits].sum() / 3 / tile.points == pytest.approx(np.pi, rel=0.03)
 
 
+@pytest.mark.long
 def test_kernels_do_not_depend_on_the_number_of_paths() -> None:
     gc.collect()  # kernels hold the BSDFs of all scenes that are left, which would go in between
     scene = corner({**FIRST, "floor": GLOSSY, "ball": GLOSSY})

@@ -49,6 +49,7 @@ def test_the_noise_is_noted_and_is_that_between_bakes(tmp_path: Path) -> None:
     assert noted_noise(stores[0], replace(FROM_ABOVE, fov_y_deg=9.0), SIZE, 64) is None, "of another view"
 
 
+@pytest.mark.long
 def test_interreflections_of_other_materials_than_the_view_has_now_are_refused(tmp_path: Path) -> None:
     folder, few = tmp_path / "s", replace(BOUNCES, samples=4)
     bake(SCENE, folder, only={"interreflection"}, views=[VIEW], bounces=few).close()

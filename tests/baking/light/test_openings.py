@@ -120,6 +120,7 @@ def test_the_material_of_openings_replaces_no_other() -> None:
     assert scene.materials[MATERIAL] == green and not any(scene.materials[scene.objects[0].material].kd)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["disc", "box"])
 def test_a_light_map_has_all_the_light_of_an_opening_nearby(tmp_path: Path, name: str) -> None:
     """Rays to the opening and sampled directions add up to the light that paths bring, .4 m below."""

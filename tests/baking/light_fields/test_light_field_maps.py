@@ -143,6 +143,7 @@ def test_a_bake_writes_what_the_contract_says(store: Store) -> None:
     assert (away < np.linalg.norm(points[None] - p[:, None], axis=-1).min(axis=1) + 0.1).all()
 
 
+@pytest.mark.long
 def test_an_interrupted_bake_ends_with_the_same_bits(store: Store, tmp_path: Path) -> None:
     scene = with_field(coloured_room())
 

@@ -95,6 +95,7 @@ def test_measured_table_throws_the_same_light_by_photons_and_by_paths(tmp_path: 
     assert paths.read("light_map/traced")[..., :3].sum() > 1.2 * document.read("light_map/traced")[..., :3].sum()
 
 
+@pytest.mark.long
 def test_gathering_counts_the_table_once(tmp_path: Path, table: Path) -> None:
     quality = QUALITY.changed(light_map={"samples": (64, 64), "gather_samples": 32})
     satin = replace(room(table), materials={"grey": GREY, "black": Material(), "satin": SATIN})

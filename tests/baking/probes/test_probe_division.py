@@ -66,6 +66,7 @@ def test_object_in_two_rooms_has_a_probe_in_each(tmp_path: Path) -> None:
     assert {a.name: a.key for a in again.artefacts()} == {a.name: a.key for a in store.artefacts()}
 
 
+@pytest.mark.long
 def test_a_cut_that_viewers_do_not_see_is_not_made() -> None:
     """From a camera in the red room nobody sees the half of the bar that mirrors the blue one."""
     assert set(cuts_of(TriangleVisibility(two_rooms()))) == {"bar"}

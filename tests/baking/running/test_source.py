@@ -37,6 +37,7 @@ def changed(scene: Scene) -> Scene:
     return replace(scene, materials={**scene.materials, scene.objects[0].material: RED})
 
 
+@pytest.mark.long
 def test_reference_has_the_materials_of_the_bake(tmp_path: Path) -> None:
     original = load_scene("builtin:box")
     scene = changed(original)

@@ -118,6 +118,7 @@ def test_window_lights_as_its_form_factor(lit_pit: tuple[SceneBuilder, object], 
     assert values.mean() == pytest.approx(wanted, abs=4 * error) and error < 0.05 * wanted
 
 
+@pytest.mark.long
 def test_window_is_sampled_with_a_fraction_of_the_variance(lit_pit: tuple[SceneBuilder, object]) -> None:
     plain = built(pit(ConstantEnvironment((1.0, 1.0, 1.0))), guided=False)[1]
     variances = [direct(scene, (0.4, 0.0, 0.3), 1 << 15).var() for scene in (lit_pit[1], plain)]

@@ -145,6 +145,7 @@ def test_light_map_and_sun_add_up_to_all_light_on_the_floor(tmp_path: Path, numb
     assert np.all(np.abs((rest + direct).mean(axis=0) - former.mean(axis=0)) < 4 * error)
 
 
+@pytest.mark.long
 def test_photons_leave_out_the_same_light(tmp_path: Path) -> None:
     for scene in suns(tmp_path)[1:]:
         found = sun_of(scene)

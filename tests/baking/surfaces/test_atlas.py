@@ -20,6 +20,7 @@ def triangles(scene: Scene) -> np.ndarray:
     return np.concatenate([o.mesh.positions[o.mesh.faces] for o in scene.objects])
 
 
+@pytest.mark.long
 def test_faces_keep_their_place_and_their_objects() -> None:
     scene = room_with_step()
     arrays = merged(unwrap(scene, 128))
@@ -76,6 +77,7 @@ def test_light_map_scale_gives_fewer_texels() -> None:
     assert size["coarse"] == pytest.approx(size["floor"] / 4, rel=0.1)
 
 
+@pytest.mark.long
 def test_texels_know_their_surface_point() -> None:
     atlas = unwrap(plane(), 64)
     arrays = merged(atlas)

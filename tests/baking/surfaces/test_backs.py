@@ -48,6 +48,7 @@ def light_of(store: Store, name: str, side: str) -> np.ndarray:
     return np.asarray(image.reshape(-1, 3)[texels.index[mine], 1])
 
 
+@pytest.mark.long
 def test_backs_that_are_seen_have_their_own_light(tmp_path: Path) -> None:
     store = bake(scene(), tmp_path / "s", quality=LIGHT, only=("light_map",))
     assert backs_of(store) == {"shelf", "crate"}, "of the floor nobody sees the back"

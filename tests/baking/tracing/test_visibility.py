@@ -129,6 +129,7 @@ def test_hidden_points_and_texels_by_hand() -> None:
     assert everything.all() and (same == labels).all()
 
 
+@pytest.mark.long
 def test_a_side_on_which_nothing_is_lit_needs_no_rays(tmp_path: Path) -> None:
     """A camera in a room of closed bodies asks for the light of backs, of which there is none."""
     eye = Camera("eye", (0.6, 0.3, 0.8), (-0.8, -0.2, -0.4))

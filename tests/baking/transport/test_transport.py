@@ -207,6 +207,7 @@ def test_retro_lobes_see_the_light_turned_about_the_normal() -> None:
     assert not np.allclose(found, view(FLOOR, lights).picture(about_mirror, 128, 32), rtol=0.1)
 
 
+@pytest.mark.long
 def test_no_pixel_looks_through_a_surface() -> None:
     """Where the pixels to the left and to the right show one place of the teapot, so does the one between them."""
     engine()

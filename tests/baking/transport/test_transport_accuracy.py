@@ -28,6 +28,7 @@ def outdoors() -> View:
     return view(ball_on_floor(), environment_triangles(*environment(), 150), (6, 5))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("edit", EDITS)
 def test_highlights_are_those_of_whole_curves(outdoors: View, edit: str) -> None:
     """To .6 %, with 128 x 16 nodes; steps of as many bands, in which the angles are independent, err by 1 to 2 %."""

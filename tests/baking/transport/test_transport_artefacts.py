@@ -86,6 +86,7 @@ def editables(scene: Scene) -> dict[str, Editable]:
     return {name: of_material(material) for name, material in scene.materials.items()}
 
 
+@pytest.mark.long
 def test_pictures_from_the_store_are_the_sum_over_its_lights(store: Store, scene: Scene) -> None:
     """Half floats and pairs that are left out cost less than 1/1000 of a pixel."""
     lights = ViewTracer(scene).lights(200)
@@ -160,6 +161,7 @@ def test_nothing_is_baked_twice_and_scales_and_curves_are_no_inputs(store: Store
     assert {a.name: (a.key, a.done) for a in again.artefacts()} == before
 
 
+@pytest.mark.long
 def test_textures_are_in_the_transport(tmp_path: Path) -> None:
     """A floor whose texture halves green, under even light: radiance kd texture."""
     texels = np.broadcast_to(np.array([1.0, 0.5, 1.0], np.float16), (2, 2, 3))

@@ -50,6 +50,7 @@ def matrix(found: Any, counts: tuple[int, int]) -> np.ndarray:
     return whole.reshape(-1, *counts, 3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("own", [16, 100])
 def test_parts_of_the_bands_and_blocks_of_points_change_nothing(
     outdoors: View, monkeypatch: pytest.MonkeyPatch, own: int

@@ -61,6 +61,7 @@ def one_azimuth(monkeypatch):
     monkeypatch.setattr(check, "PHI_DEG", (0.0,))
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("one_azimuth")
 def test_normalise_writes_the_safe_version(lambent, tmp_path):
     STEEP.save(tmp_path / "m.json")
@@ -96,6 +97,7 @@ def test_everything_left_out_is_printed_with_its_count(lambent, paint):
     assert f"{facts['used']} tuples fitted" in text
 
 
+@pytest.mark.long
 def test_the_other_side_of_a_sheet_is_left_out_and_counted(lambent, tmp_path):
     path = tmp_path / "sheet.xml"
     values, quarter = words(np.full((41, 41), 0.1)), "LBNL/Klems Quarter"
@@ -110,6 +112,7 @@ def test_the_other_side_of_a_sheet_is_left_out_and_counted(lambent, tmp_path):
     assert "light from -z" not in lambent("fit", path).out
 
 
+@pytest.mark.long
 def test_the_albedo_is_in_the_summary_and_can_be_kept(lambent, paint):
     for options in ((), ("--keep-albedo",)):
         outcome = lambent("fit", paint, *options)
@@ -197,6 +200,7 @@ def test_the_ending_says_the_format(lambent, measured, tmp_path):
     assert load(tmp_path / "out.txt").info.format == "gonio text"
 
 
+@pytest.mark.long
 def test_a_person_is_told_the_loss_and_the_error(lambent, material, tmp_path):
     outcome = lambent("convert", material, tmp_path / "out.bsdf", "--as", "rgl")
     assert outcome.code == 0 and load(tmp_path / "out.bsdf").info.format == "RGL tensor file"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from scipy.ndimage import binary_erosion
 
 from lambent.core.geometry.plan_cells import filled
@@ -12,6 +13,7 @@ from lambent.scenes.geometry import box, patch, placed
 RNG = np.random.default_rng(7)
 
 
+@pytest.mark.long
 def test_cells_are_filled_whose_centre_lies_in_a_triangle() -> None:
     triangles = RNG.uniform(-8, 40, (12, 3, 2))
     rows, columns = np.mgrid[:32, :40]

@@ -111,6 +111,7 @@ def evalglare() -> Path | None:
     return program if program and program.exists() else None
 
 
+@pytest.mark.long
 @pytest.mark.skipif(evalglare() is None, reason="pyradiance has no evalglare here: Radiance cannot be asked")
 @pytest.mark.parametrize(
     ("lamps", "background", "projection"),

@@ -242,6 +242,7 @@ class LeavesAPartUnsampled(MaterialBSDF):
         return self.near_side.sample(wo, u)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "complaints"),
     [(NotReciprocal, ["not reciprocal"]), (WrongPdf, ["do not follow the density", "by quadrature"])],
@@ -270,6 +271,7 @@ def test_furnace_of_a_tight_mirror():
     np.testing.assert_allclose(result.albedo[below_85], 1, atol=2e-3)
 
 
+@pytest.mark.long
 def test_the_check_is_deterministic_and_shows_progress(few_samples):
     seen = []
     first = check(FOIL, seed=3, progress=lambda done, total, what: seen.append((done, total, what)))

@@ -57,6 +57,7 @@ def within_tolerance(written: Floats, f: Floats) -> None:
     assert (np.abs(written - f) <= tree_growth.TOLERANCE * (f + f.mean())).all()
 
 
+@pytest.mark.long
 def test_every_convention(tmp_path: Path, small: Callable[[int], None]) -> None:
     """Order of dimensions, headings, sides: each shows, as the formula is different in all of them."""
     small(16)

@@ -238,6 +238,7 @@ def gltf_f(written: dict[str, Any], geometry: Geometry) -> Floats:
     return np.asarray(np.where(geometry.far[:, None], far, near))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("material", [*MATERIALS, FOIL], ids=named)
 def test_gltf(tmp_path: Path, material: Material) -> None:
     ending = ".glb" if material in (PAPER, FOIL) else ".gltf"

@@ -94,6 +94,7 @@ def test_rgl_is_what_mitsuba_reads(tmp_path: Path, small_rgl: None, mi: Any, mat
     assert np.quantile(off, 0.99) < 5e-3 and np.median(off) < 1e-4
 
 
+@pytest.mark.long
 def test_rgl_keeps_a_narrow_lobe_and_reports_lost_transmission(tmp_path: Path, small_rgl: None, monkeypatch) -> None:
     monkeypatch.setitem(rgl.NODES, "isotropic", 64)
     mirrorlike = Material(name="mirror", lobes=(Lobe(mx=0.01, my=0.01, r0=(0.9,) * 3, k=(1.0,) * 3),))
@@ -208,6 +209,7 @@ def test_a_matrix_is_written_as_it_was_read(tmp_path: Path, hasty: None) -> None
     assert not any("behind" in lost for lost in cost.lost)
 
 
+@pytest.mark.long
 def test_a_measured_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Grey and glossy, known from one side alone; the cost has every metric and names the missing back."""
     glossy = Material(name="glossy", kd=GREY, lobes=(Lobe(k=(0.5, 0.5, 0.5), mx=0.2, my=0.2, r0=0.3),))
@@ -259,6 +261,7 @@ def test_merl(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert (f[(wi[:, 2] < -1e-3) | (wo[:, 2] < -1e-3)] < 0).all() and above.sum() > 5000
 
 
+@pytest.mark.long
 def test_gonio_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every row is the material's f at its angles; theta_o over 90 degrees is below the sheet."""
     monkeypatch.setitem(gonio_text.THETA_I_DEG, "other", (0, 35, 70))

@@ -130,6 +130,7 @@ def test_a_document_s_path_opens_as_its_curves(tmp_path: Path) -> None:
     assert set(opened.editable.curves) == {"diffuse", "highlight along", "highlight across"}
 
 
+@pytest.mark.long
 def test_a_merl_file_s_own_bins_are_exact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A small table of MERL's layout that no product is."""
     monkeypatch.setattr(factors, "FITTED", Grid(45, 24, 12, turns_d=2))

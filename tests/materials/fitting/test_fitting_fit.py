@@ -64,6 +64,7 @@ def test_every_metric_finds_it(beads, metric):
     assert retro.retro and retro.k[0] == pytest.approx(0.3, rel=0.03) and retro.mx == pytest.approx(0.03, rel=0.03)
 
 
+@pytest.mark.long
 def test_tapes_of_other_shape_keep_their_peak(tape):
     tape, samples = tape
     without, with_it = fit(samples, retro=False), fit(samples)
@@ -266,6 +267,7 @@ def test_the_thesis_materials_are_recovered(name):
             assert found.k[0] * (1 - found.r0[0]) == pytest.approx(true.k[0] * (1 - true.r0[0]), rel=0.02)
 
 
+@pytest.mark.long
 def test_only_the_product_of_a_transmission_is_measured():
     result = fit(grey(FOIL, replace(ISOTROPIC, step_deg=8)))
     assert any("kt (1 - r0)" in line for line in result.warnings)

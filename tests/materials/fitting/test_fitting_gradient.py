@@ -169,6 +169,7 @@ def light(table: MeasuredTable, metric: str) -> tuple[Floats, Floats]:
     return bsdf.albedo(WI).mean(axis=0), table.reflectivity(WI).mean(axis=0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("metric", [SEEN, "l1"])
 def test_other_channels_do_not_notice_a_negative_one(clean: Path, tmp_path: Path, metric: str) -> None:
     before, table = load(clean), changed(clean, tmp_path, BLUE, DEFICIT)
@@ -180,6 +181,7 @@ def test_other_channels_do_not_notice_a_negative_one(clean: Path, tmp_path: Path
     assert 0 <= other[BLUE] - one[BLUE] < np.pi * DEFICIT
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("metric", [SEEN, "l1"])
 def test_noise_about_zero_leaves_the_albedo(clean: Path, tmp_path: Path, metric: str) -> None:
     table = changed(clean, tmp_path, noise=DEFICIT)

@@ -185,6 +185,7 @@ def test_colour_of_matrices_agrees_with_radiance(tmp_path: Path) -> None:
     assert any("Solar" in note for note in table.info.notes)
 
 
+@pytest.mark.long
 @needs_radiance
 def test_colour_of_trees_agrees_with_radiance(tmp_path: Path) -> None:
     """Y, u' and v' with different cells; luminance is Y everywhere, and the sums are those of the values."""

@@ -106,6 +106,7 @@ def test_an_even_texture_is_another_colour(baked: BakedScene, stored: StoredAnsw
     assert np.allclose(answer.probe_change("ball", textured), change, atol=0.02 * np.abs(change).max())
 
 
+@pytest.mark.long
 def test_a_half_black_picture_is_dark_beside_its_black_half(
     store: Store, baked: BakedScene, stored: StoredAnswer, tmp_path: Path
 ) -> None:

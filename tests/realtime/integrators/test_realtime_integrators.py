@@ -88,6 +88,7 @@ def test_qmc_converges_to_the_integral(device, name: str) -> None:
     assert np.abs(z.mean()) < 0.5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["along x", "ggx", "curve", "foil", "retro tape"])
 def test_few_samples_come_close_under_smooth_light(device, name: str) -> None:
     renderer = Renderer(device, wall_scene(material(MATERIALS[name]), cube_of(smooth_light)))
@@ -99,6 +100,7 @@ def test_few_samples_come_close_under_smooth_light(device, name: str) -> None:
             assert np.abs(image - truth).mean() < tolerance * truth.mean(), integrator
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name, m", [("haze", 0.05), ("tail", 0.06), ("flat", 0.1)])
 def test_seven_samples_hold_core_and_tail_of_a_curve(device, name: str, m: float) -> None:
     """A lamp far from the mirror direction lights the tail alone; rings of equal mass err twice as much."""
@@ -127,6 +129,7 @@ def test_a_retro_reflector_shows_the_light_behind_the_viewer(device) -> None:
         np.testing.assert_allclose(renderer.converged(STATE, 64), expected, rtol=0.03)
 
 
+@pytest.mark.long
 def test_split_sum_table_is_the_albedo() -> None:
     lobe = Lobe(mx=0.3, my=0.3, r0=(0.2, 0.5, 0.9), k=1.0, alpha=0.4)
     cos_o = (np.arange(32) + 0.5) / 32

@@ -122,6 +122,7 @@ def test_any_curve_has_samples(name: str, m: float, alpha: float, retro: bool) -
         assert rows[:, 3].mean() == pytest.approx(1, abs=1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("table", [patterns.rings_table, patterns.lobe_table])
 @pytest.mark.parametrize("n", [5, 19])
 def test_no_jump_while_the_roughness_slides(table, n: int) -> None:

@@ -52,6 +52,7 @@ def alone(device: Any, scene: BakedScene) -> dict[str, np.ndarray]:
     return {name: image(device, scene, {other: DARK for other in NAMES if other != name}) for name in NAMES}
 
 
+@pytest.mark.long
 def test_groups_alone_add_up_to_the_light_as_baked(
     device: Any, scene: BakedScene, alone: dict[str, np.ndarray]
 ) -> None:
@@ -60,6 +61,7 @@ def test_groups_alone_add_up_to_the_light_as_baked(
     assert all(picture.mean() > 0.01 for picture in alone.values())
 
 
+@pytest.mark.long
 def test_a_mix_is_the_weighted_sum(device: Any, scene: BakedScene, alone: dict[str, np.ndarray]) -> None:
     mix = {"lamp": RED, "sky": (0.3, 0.3, 0.3), "sun": (0.0, 2.0, 0.0)}
     expected = sum(alone[name] * factor for name, factor in mix.items())
@@ -110,6 +112,7 @@ def test_a_window_does_not_wait_and_shows_the_same_in_the_end(
     assert renderer.image(state) == pytest.approx(expected, rel=1e-3, abs=1e-3)
 
 
+@pytest.mark.long
 def test_work_that_ends_after_its_last_part_was_shown_is_over(
     device: Any, scene: BakedScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -145,6 +148,7 @@ def test_the_sun_is_in_its_group_alone(scene: BakedScene) -> None:
     assert probe is not None and probe.radiance.max() < 16, "its disc, of 50, is drawn by pixel"
 
 
+@pytest.mark.long
 def test_an_unknown_group_is_an_error(device: Any, scene: BakedScene) -> None:
     with pytest.raises(UserError, match=r"unknown light group.*lomp.*lamp, sky, sun"):
         image(device, scene, {"lomp": DARK})

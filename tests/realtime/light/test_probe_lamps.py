@@ -102,6 +102,7 @@ def test_a_quarter_of_the_sky(device) -> None:
     assert np.sqrt(np.mean((renderer.image(state) - renderer.converged(replace(state, n=64), 16384)) ** 2)) < 0.03
 
 
+@pytest.mark.long
 def test_nothing_pops_while_a_roughness_is_dragged(device) -> None:
     """Steps of 2 % in m: none changes the picture by much more than its neighbours do."""
     lamps = [((0.5, 0.5, 0.9), 0.05, 100.0), ((-0.6, 0.3, 0.8), 0.13, 30.0)]

@@ -104,6 +104,7 @@ def room_light(x: np.ndarray, w: np.ndarray) -> np.ndarray:
     return np.asarray(1.5 + np.sin(12 * (x + t[..., None] * w)))
 
 
+@pytest.mark.long
 def test_shader_and_numpy_agree(device: Any, field: LightField) -> None:
     glass = lens()
     place, w, inside, uv2 = views(field)
@@ -119,6 +120,7 @@ def test_shader_and_numpy_agree(device: Any, field: LightField) -> None:
     assert np.quantile(error, 0.5) < 4e-3 and np.quantile(error, 0.97) < 0.04, np.quantile(error, [0.5, 0.9, 0.97])
 
 
+@pytest.mark.long
 def test_a_sheet_lets_light_pass_straight(device: Any, field: LightField) -> None:
     """It has no second face to refract at."""
     sheet = pane()

@@ -47,6 +47,7 @@ def error(image: np.ndarray) -> float:
     return float(np.sqrt(np.mean((image - truth)[inner] ** 2)))
 
 
+@pytest.mark.long
 def test_methods_rank_as_they_should(renderer: Renderer) -> None:
     errors = {name: error(renderer.image(replace(STATE, lookup=name))) for name in ("plain", "light_field")}
     assert errors["light_field"] < 0.25 * errors["plain"]

@@ -50,6 +50,7 @@ def test_shader_and_numpy_agree(device: Any, across: int) -> None:
     assert np.quantile(error, 0.5) < 5e-4 and np.quantile(error, 0.995) < 3e-3, np.quantile(error, [0.5, 0.995, 1])
 
 
+@pytest.mark.long
 def test_shader_and_numpy_agree_on_quarters_of_texels(device: Any, field: LightField) -> None:
     """Any quarters at all; but for rays that pass a surface within the .4 % that the bits take of its distance."""
     cover = np.random.default_rng(3).integers(0, 16, field.inverse_distance.shape).astype(np.uint8)

@@ -70,6 +70,7 @@ def test_a_view_gets_the_maps_that_it_needs(device: Any, scene: BakedScene) -> N
     np.testing.assert_allclose(half.image(turned), exact.image(turned), **ROUNDED)
 
 
+@pytest.mark.long
 def test_a_frame_that_does_not_wait_is_drawn_from_what_is_there(device: Any, scene: BakedScene) -> None:
     """The window's way: the first frame is of maps that happened to be there, later ones of all that is needed."""
     exact, renderer = Renderer(device, scene).image(STATE), budgeted(device, scene, 44.5)

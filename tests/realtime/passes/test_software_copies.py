@@ -73,7 +73,7 @@ def compiled() -> int:
     return sum(int(end, 16) - int(begin, 16) for begin, end in places)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", SCENES)
 def test_frames_copy_no_shader(device: Any, name: str) -> None:
     if not sys.platform.startswith("linux") or not adapter_info(device).is_software:

@@ -142,6 +142,7 @@ def test_penumbra_stays_sharp_over_a_plane_of_fifty_kilometres(device: Any) -> N
     assert np.abs(found - expected).mean() < 0.02
 
 
+@pytest.mark.long
 def test_lit_surfaces_do_not_shadow_themselves_and_blocks_do_not_leak(device: Any) -> None:
     block = placed(box((0.8, 0.6, 0.8)), (0, 0.3, 0))
     camera = Camera(name="aside", position=(2.0, 2.2, 1.2), target=(0.0, 0.2, 0.0), fov_y_deg=45.0)

@@ -32,6 +32,7 @@ QUALITY = TINY.changed("tiny, clear sky", environment={"texels": 64})
 STATE = FrameState(CAMERA, SIZE, SIZE, n=1, antialias=False, show="specular", integrator="rings")
 
 
+@pytest.mark.long
 def test_what_mirrors_the_sky_mirrors_the_turned_one(device: Any) -> None:
     """As numpy's look-up in maps under the sky turned by hand; walls stay, and another turn is another picture."""
     field = plate_field()

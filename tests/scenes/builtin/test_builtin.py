@@ -260,6 +260,7 @@ def samples(mesh: Mesh) -> np.ndarray:
     return np.concatenate([c.reshape(-1, 3), ((c + np.roll(c, 1, axis=1)) / 2).reshape(-1, 3), c.mean(axis=1)])
 
 
+@pytest.mark.long
 def test_pixels_are_near_the_published_ones(published: Scene, mi: Any) -> None:
     from lambent.baking.tracing.scene_builder import SceneBuilder
     from lambent.baking.transport.view_points import view_points

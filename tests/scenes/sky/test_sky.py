@@ -95,6 +95,7 @@ def test_interiors_are_lit_by_small_bright_lights(name: str) -> None:
     assert image.max() > 1e4 * image.min()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", COMPUTED)
 def test_the_image_is_the_mean_of_the_interior(name: str) -> None:
     """Texels that no edge crosses are the radiance in their direction: the image is oriented as core.latlong."""

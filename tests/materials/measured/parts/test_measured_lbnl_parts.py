@@ -333,6 +333,7 @@ def sums_by_direction(table: LbnlTable) -> tuple[Floats, Floats, Floats]:
     return wi, np.bincount(number[~far], power[~far], len(wi)), np.bincount(number[far], power[far], len(wi))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("structure", ["Columns", "TensorTree3", "TensorTree4"])
 @pytest.mark.parametrize("transmission", ["Front", "Back"])
 def test_tuples_sum_to_the_albedos(loaded: Loaded, structure: str, transmission: str) -> None:

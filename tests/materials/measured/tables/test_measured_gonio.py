@@ -89,6 +89,7 @@ def test_no_value_is_outside_the_range_of_the_nearest_tuples(name, hemisphere):
     assert under <= 1 + 1e-9
 
 
+@pytest.mark.long
 def test_it_is_exact_at_tuples_continuous_and_reciprocal(hemisphere):
     wi, wo = scan(hemisphere)
     table = table_of(TRUTHS["sharp"], wi, wo)

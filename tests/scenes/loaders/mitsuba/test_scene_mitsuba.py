@@ -330,6 +330,7 @@ def test_daylight_is_scaled_as_a_whole_and_by_parts(tmp_path: Path, kind: str, s
     assert np.linalg.norm(made.sun_direction) == pytest.approx(1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("said", "radius_deg"),
     [
