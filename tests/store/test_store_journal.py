@@ -65,6 +65,7 @@ def work_per_chunk(folder: Path, rows: int, monkeypatch: pytest.MonkeyPatch) -> 
     return counts["calls"] / rows, counts["bytes"] / rows
 
 
+@pytest.mark.long
 def test_a_thousand_chunks_cost_no_more_each_than_forty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     few = work_per_chunk(tmp_path / "few", 40, monkeypatch)
     many = work_per_chunk(tmp_path / "many", 1000, monkeypatch)

@@ -31,6 +31,7 @@ def test_it_is_read_whole(stored):
     assert list(store.cameras) == ["front"] and store.light_groups == ("lamp",) and "white" in store.materials
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("integrator", DRAWN)
 def test_it_looks_as_it_did(adapter, stored, integrator):
     store = lambent.open(stored)

@@ -35,7 +35,7 @@ print(json.dumps(counts))
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_renderers_of_modes_before_are_freed(virtual_screen, tmp_path):
     store = write_small_store(tmp_path / "small")
     environment = {**os.environ, "DISPLAY": virtual_screen.name}

@@ -83,7 +83,7 @@ def test_a_store_that_is_gone_is_not_made_anew(state, tmp_path):
     assert [p.name for p in Views.model_validate_json(file.read_text()).paths] == ["walk 1"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_window_that_loses_its_display_keeps_its_material(virtual_screen, tmp_path):
     screen = VirtualScreen()
     session = WindowSession(screen, write_small_store(tmp_path / "store"), tmp_path)
@@ -161,7 +161,7 @@ sys.exit(main.run(["walk", sys.argv[1]]))
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_lost_device_keeps_the_session(virtual_screen, tmp_path):
     store = write_small_store(tmp_path / "small")
     environment = {**os.environ, "DISPLAY": virtual_screen.name}

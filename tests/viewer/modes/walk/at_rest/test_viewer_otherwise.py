@@ -80,6 +80,7 @@ def both(state, pictures, camera):
     return before, pictures.shown[0].read()
 
 
+@pytest.mark.long
 def test_a_turned_sky_and_a_mesh_in_place_of_an_object_are_traced(opened, folder):
     """The mesh with its edits, in light as baked."""
     state, pictures = opened()

@@ -203,6 +203,7 @@ def test_the_meter_reads_the_traced_picture(pictures, state):
     assert state.meter.reading is not None and pictures.shown[0] is found
 
 
+@pytest.mark.long
 def test_glare_is_rated_in_traced_pictures_at_rest(pictures, state):
     """The shown picture stays meanwhile, and until one with as many samples replaces it."""
     found, glare = traced(pictures, state, 24), state.meter.glare
