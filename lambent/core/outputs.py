@@ -15,6 +15,11 @@ from lambent.core.files import check_place
 from lambent.core.inputs import open_input
 
 MARK = "Lambent made this file and may replace it"
+OF_FILES = (
+    ".binary", ".blend", ".bmp", ".bpt", ".bsdf", ".csv", ".exr", ".gif", ".gldf", ".glb", ".gltf", ".gonio", ".hdr",
+    ".htm", ".html", ".ies", ".jpeg", ".jpg", ".json", ".ldt", ".mp4", ".mtlx", ".obj", ".pdf", ".ply", ".png", ".svg",
+    ".tga", ".tif", ".tiff", ".toml", ".txt", ".webp", ".xml", ".zip",
+)  # endings of files, never of a folder  # fmt: skip
 _HEAD_BYTES, _TAIL_BYTES = 8 << 20, 1 << 16  # a film's mark follows the sizes of its frames, 8 bytes each
 
 
@@ -42,6 +47,13 @@ def check_output(path: Path, suffixes: Iterable[str] = (), *, force: bool, input
         raise UserError("output is the input", file=path, hint="write to another file, or add --force to replace it")
     if not is_marked(path):
         raise UserError("exists already", file=path, hint="write to another file, or add --force to replace it")
+
+
+def check_new_folder(path: Path, what: str) -> None:
+    """Raise `UserError` if a folder for `what`, such as "a site", is to be made and named like a file."""
+    if not path.exists() and path.suffix.lower() in OF_FILES:
+        expected = f"the name of a folder, such as {path.stem}"
+        raise UserError(f"names a file, and {what} is a folder", file=path, expected=expected)
 
 
 def is_marked(path: Path) -> bool:

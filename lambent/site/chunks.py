@@ -13,6 +13,7 @@ import base64
 import gzip
 import hashlib
 import io
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -100,9 +101,14 @@ class Chunks:
         return self.add(table.tobytes(), Packing(4, table.shape[1], [(table.size, 0)]))
 
     def add(self, data: bytes, packing: Packing | None = None) -> dict[str, Any]:
-        """Where `data` is: a file relative to the site, named by its SHA-256, bytes unpacked and packed, packing."""
-        digest = hashlib.sha256(data).hexdigest()
-        name = f"data/{digest[:20]}.gz"
+        """Where `data` is: a file relative to the site, bytes unpacked and packed, packing.
+
+        The file is named by the SHA-256 of data and packing: the same data packed in another way is another file.
+        """
+        said = {} if packing is None else {"packing": packing.said()}
+        digest = hashlib.sha256(data)
+        digest.update(json.dumps(said).encode())
+        name = f"data/{digest.hexdigest()[:20]}.gz"
         if name not in self._added:
             packed = gzip.compress(data if packing is None else packing.packed(data), LEVEL, mtime=0)
             found: dict[str, Any] = {"file": name, "bytes": len(data), "packed": len(packed)}
@@ -111,5 +117,5 @@ class Chunks:
             else:
                 write_bytes(self._folder.parent / name, packed)
                 self.files[name] = len(packed)
-            self._added[name] = found if packing is None else {**found, "packing": packing.said()}
+            self._added[name] = {**found, **said}
         return dict(self._added[name])

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
-import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, replace
 from functools import partial
-from importlib.resources import as_file, files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lambent.core.errors import UserError
-from lambent.core.files import atomic_path, write_bytes, write_text
-from lambent.core.inputs import read_head
 from lambent.core.light.exposure import metered
 from lambent.core.light.light_mix import MixTrack
 from lambent.core.progress import Progress, silent, tracked
@@ -32,6 +30,7 @@ from lambent.site.cameras import cameras_of, frames_of, widest
 from lambent.site.manifest import Manifest, camel
 from lambent.site.memory import graphics_bytes, needs_of, script_bytes, transferred
 from lambent.site.mixing import mixing_of
+from lambent.site.replacing import check_folder, replacing
 from lambent.site.things import things
 from lambent.store.kept.states import lamps_of, variants_of
 from lambent.store.kept.views import read_views
@@ -39,7 +38,8 @@ from lambent.store.light_groups import light_groups
 from lambent.store.store import Store
 
 Note = Callable[[str], None]
-FORMAT, VERSION, UNFINISHED = "lambent-site", 1, 0
+FORMAT, VERSION = "lambent-site", 1
+NAMED_BY_CONTENT = "data", "shaders"  # folders
 SIZE = 640, 360  # of the frame that is described; the page's follows its canvas
 POSTER = 960, 540  # a picture for browsers without WebGPU, and while the room loads
 DISPLAY, BAKED = "site", "as baked"
@@ -63,40 +63,41 @@ def export(store: Store, folder: Path, progress: Progress = silent, note: Note =
     baked = read_baked(store)
     if not baked.record.cameras:
         raise UserError("has no camera", file=store.folder, hint="add [[cameras]] to its scene.toml")
-    mark(folder, FORMAT)
-    for part in ("data", "shaders"):
-        shutil.rmtree(folder / part, ignore_errors=True)
-    device = DescribedDevice(open_device(device_needs(baked)))
-    renderer = Renderer(device, baked)
-    saved = read_views(store.folder).cameras
-    cameras = [*baked.record.cameras, *(one for one in saved if one.name not in {c.name for c in baked.record.cameras})]
-    state = FrameState(cameras[0], *SIZE)
-    exposure_ev = baked.record.exposure_ev
-    if exposure_ev is None:
-        exposure_ev = metered(renderer.image(state)) or 0.0
-    _write_poster(renderer, replace(state, exposure_ev=exposure_ev), folder / "poster.jpg")
-    shown = renderer.target(DISPLAY, SIZE).create_view()
-    manifest, states = Manifest(device, folder, SIZE, shown, in_blocks=baked.groups is None), []
-    rooms = list(_states(store, renderer, state, note))
-    of_cameras, mixing = cameras_of(renderer, manifest, state), mixing_of(manifest, renderer, note)
-    for room, now in tracked(rooms, progress, "states"):
-        one = now()
-        said = {"name": room.name or BAKED, "m": widest(renderer, one)}
-        states.append({**said, **manifest.state(frames_of(renderer, one, shown))})
-        if mixing is not None:
-            states[-1]["mixing"] = mixing.state(room.light)
-    document = {
-        "format": FORMAT, "version": VERSION, "name": baked.record.name,
-        "cameras": [camel(asdict(one)) for one in cameras],
-        "bounds": np.asarray(baked.record.bounds).tolist(), "exposureEv": exposure_ev, "unit": baked.unit,
-        "viewTransform": VIEW_TRANSFORMS[state.view_transform],
-        **of_cameras,
-        "visit": things(store.folder, baked.record, renderer.resources, manifest, [room for room, _ in rooms]),
-        "needs": needs_of(manifest.tables), "tables": manifest.tables, "passes": manifest.passes, "states": states,
-        **({} if mixing is None else mixing.said),
-    }  # fmt: skip
-    write_text(folder / "manifest.json", json.dumps(document, separators=(",", ":"), allow_nan=False))
-    _copy_page(folder)
+    with replacing(folder, FORMAT, NAMED_BY_CONTENT) as site:
+        device = DescribedDevice(open_device(device_needs(baked)))
+        renderer = Renderer(device, baked)
+        saved = read_views(store.folder).cameras
+        names = {one.name for one in baked.record.cameras}
+        cameras = [*baked.record.cameras, *(one for one in saved if one.name not in names)]
+        state = FrameState(cameras[0], *SIZE)
+        exposure_ev = baked.record.exposure_ev
+        if exposure_ev is None:
+            exposure_ev = metered(renderer.image(state)) or 0.0
+        poster = _poster(renderer, replace(state, exposure_ev=exposure_ev))
+        shown = renderer.target(DISPLAY, SIZE).create_view()
+        manifest, states = Manifest(device, folder, SIZE, shown, in_blocks=baked.groups is None), []
+        rooms = list(_states(store, renderer, state, note))
+        of_cameras, mixing = cameras_of(renderer, manifest, state), mixing_of(manifest, renderer, note)
+        for room, now in tracked(rooms, progress, "states"):
+            one = now()
+            said = {"name": room.name or BAKED, "m": widest(renderer, one)}
+            states.append({**said, **manifest.state(frames_of(renderer, one, shown))})
+            if mixing is not None:
+                states[-1]["mixing"] = mixing.state(room.light)
+        document = {
+            "name": baked.record.name,
+            "cameras": [camel(asdict(one)) for one in cameras],
+            "bounds": np.asarray(baked.record.bounds).tolist(), "exposureEv": exposure_ev, "unit": baked.unit,
+            "viewTransform": VIEW_TRANSFORMS[state.view_transform],
+            **of_cameras,
+            "visit": things(store.folder, baked.record, renderer.resources, manifest, [room for room, _ in rooms]),
+            "needs": needs_of(manifest.tables), "tables": manifest.tables, "passes": manifest.passes, "states": states,
+            **({} if mixing is None else mixing.said),
+        }  # fmt: skip
+        site.named.update(manifest.chunks.files, (one["file"] for one in manifest.tables["shader_module"]))
+        site.add("manifest.json", manifest_text(document).encode())
+        site.add("poster.jpg", poster)
+        site.add_page("page", (".html", ".js", ".css"))
     return {
         "written": folder, "bytes": transferred(document), "files": len(manifest.chunks.files),
         "folder_bytes": sum(manifest.chunks.files.values()),
@@ -106,23 +107,11 @@ def export(store: Store, folder: Path, progress: Progress = silent, note: Note =
     }  # fmt: skip
 
 
-def check_folder(folder: Path, form: str, what: str) -> None:
-    """Raise `UserError` if the folder holds anything but an export of this format."""
-    if not folder.exists():
-        return
-    if not folder.is_dir():
-        raise UserError("is no folder", file=folder, expected="a folder to write")
-    if any(folder.iterdir()):
-        manifest = folder / "manifest.json"
-        head = f'{{"format":"{form}"'.encode()
-        if not manifest.is_file() or not read_head(manifest, len(head)).startswith(head):
-            raise UserError(f"holds other files than {what}", file=folder, hint="choose a new folder")
-
-
-def mark(folder: Path, form: str, version: int = UNFINISHED) -> None:
-    """Say in the folder what it holds, and that this is unfinished, unless a version is given."""
-    folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / "manifest.json", json.dumps({"format": form, "version": version}, separators=(",", ":")))
+def manifest_text(document: Mapping[str, Any]) -> str:
+    """The manifest, which begins with its format and the SHA-256 of all that follows it and its comma."""
+    rest = json.dumps(document, separators=(",", ":"), allow_nan=False)[1:]
+    digest = hashlib.sha256(rest.encode()).hexdigest()
+    return f'{{"format":"{FORMAT}","version":{VERSION},"sha256":"{digest}",{rest}'
 
 
 def _states(
@@ -151,17 +140,10 @@ def states_of(store: Store, note: Note) -> Iterator[Variant]:
             yield variant
 
 
-def _write_poster(renderer: Renderer, state: FrameState, file: Path) -> None:
+def _poster(renderer: Renderer, state: FrameState) -> bytes:
+    """A picture, as JPEG."""
     from PIL import Image
 
-    width, height = POSTER
-    picture = Image.fromarray(renderer.still(replace(state, width=width, height=height)))
-    with atomic_path(file) as temporary:
-        picture.save(temporary, quality=85)
-
-
-def _copy_page(folder: Path) -> None:
-    with as_file(files("lambent.site").joinpath("page")) as page:
-        for file in page.iterdir():
-            if file.suffix in (".html", ".js", ".css"):
-                write_bytes(folder / file.name, file.read_bytes())
+    made, (width, height) = io.BytesIO(), POSTER
+    Image.fromarray(renderer.still(replace(state, width=width, height=height))).save(made, "jpeg", quality=85)
+    return made.getvalue()

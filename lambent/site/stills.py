@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import shutil
+import hashlib
+import io
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from importlib.resources import as_file, files
+from importlib.resources import files
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -16,7 +18,7 @@ from numpy.typing import NDArray
 
 from lambent.core.discovery import known
 from lambent.core.errors import UserError
-from lambent.core.files import atomic_path, write_bytes, write_text
+from lambent.core.files import write_bytes
 from lambent.core.light.exposure import ev100_of
 from lambent.core.plain import printable
 from lambent.core.progress import Progress, part_of, silent
@@ -24,14 +26,14 @@ from lambent.render.images import Settings
 from lambent.render.output import ignore, images, opened_with_views
 from lambent.render.sheet import BY_LIGHT, Exposures
 from lambent.site.chunks import PICTURE_QUALITY, TALLEST_PX
-from lambent.site.export import BAKED, Note, check_folder, mark, states_of
+from lambent.site.export import BAKED, Note, states_of
+from lambent.site.replacing import check_folder, replacing
 from lambent.store.store import Store
 
 FORMAT, VERSION = "lambent-stills", 1
 SIZE = 1280, 720
 PICTURES = "pictures"  # folder of the stills
 THUMBNAIL_PX = 240  # longer side
-UNFINISHED = '<p role="status">These stills are unfinished: export them again.</p>'
 
 
 @dataclass(frozen=True)
@@ -81,29 +83,29 @@ def export_stills(
     cameras = [by_name[known("view", name, by_name, field="--view")] for name in views] or [*record.cameras]
     states = [*states_of(store, note)]
     drawn = images(store, settings, note=note)
-    mark(folder, FORMAT)
-    _write_page(folder, record.name, "", UNFINISHED)
-    shutil.rmtree(folder / PICTURES, ignore_errors=True)
-    (folder / PICTURES).mkdir()
-    exposures = [Exposures(BY_LIGHT, drawn.exposure_ev) for _ in cameras]
-    stills: list[list[Still]] = [[] for _ in cameras]
-    for row, state in enumerate(states):
-        drawn.apply_variant(state)
-        for column, camera in enumerate(cameras):
-            done = row * len(cameras) + column
-            part = part_of(
-                progress, done / len(states) / len(cameras), (done + 1) / len(states) / len(cameras), "stills"
-            )
-            drawn.exposure_ev = exposures[column].wanted(state.light)
-            picture = drawn.displayed(camera, part)
-            exposures[column].take(drawn.exposure_ev)
-            file = f"{PICTURES}/{column + 1}-{row + 1}.webp"
-            _write(picture, folder / file)
-            if row == 0:
-                _write(picture, folder / _thumbnail(column), THUMBNAIL_PX)
-            stills[column].append(Still(file, camera.name, state.name or BAKED, ev100_of(drawn.exposure_ev or 0.0)))
-    _write_page(folder, record.name, _links(stills), _sections(stills, settings))
-    mark(folder, FORMAT, VERSION)
+    with replacing(folder, FORMAT, (PICTURES,)) as page:
+        exposures = [Exposures(BY_LIGHT, drawn.exposure_ev) for _ in cameras]
+        stills: list[list[Still]] = [[] for _ in cameras]
+        thumbnails: list[str] = []
+        for row, state in enumerate(states):
+            drawn.apply_variant(state)
+            for column, camera in enumerate(cameras):
+                done = row * len(cameras) + column
+                part = part_of(
+                    progress, done / len(states) / len(cameras), (done + 1) / len(states) / len(cameras), "stills"
+                )
+                drawn.exposure_ev = exposures[column].wanted(state.light)
+                picture = drawn.displayed(camera, part)
+                exposures[column].take(drawn.exposure_ev)
+                if row == 0:
+                    thumbnails.append(_written(picture, folder, f"{column + 1}", THUMBNAIL_PX))
+                file = _written(picture, folder, f"{column + 1}-{row + 1}")
+                ev100 = ev100_of(drawn.exposure_ev or 0.0)
+                stills[column].append(Still(file, camera.name, state.name or BAKED, ev100))
+        page.named.update(thumbnails, (one.file for row in stills for one in row))
+        page.add("manifest.json", json.dumps({"format": FORMAT, "version": VERSION}, separators=(",", ":")).encode())
+        page.add("index.html", _page(record.name, _links(stills, thumbnails), _sections(stills, settings)))
+        page.add_page("stills_page", (".js", ".css"))
     written = [*(folder / PICTURES).iterdir()]
     return {
         "written": folder, "bytes": sum(file.stat().st_size for file in written), "files": len(written),
@@ -111,25 +113,24 @@ def export_stills(
     }  # fmt: skip
 
 
-def _write(picture: NDArray[np.uint8], file: Path, most_px: int | None = None) -> None:
+def _written(picture: NDArray[np.uint8], folder: Path, name: str, most_px: int | None = None) -> str:
+    """The file of a picture, of at most so many pixels a side, relative to the page; named by its content, too."""
     from PIL import Image
 
-    image = Image.fromarray(picture)
+    image, made = Image.fromarray(picture), io.BytesIO()
     if most_px is not None:
         image.thumbnail((most_px, most_px))
-    with atomic_path(file) as temporary:
-        image.save(temporary, "webp", quality=PICTURE_QUALITY)
+    image.save(made, "webp", quality=PICTURE_QUALITY)
+    file = f"{PICTURES}/{name}-{hashlib.sha256(made.getvalue()).hexdigest()[:20]}.webp"
+    write_bytes(folder / file, made.getvalue())
+    return file
 
 
-def _thumbnail(view: int) -> str:
-    return f"{PICTURES}/{view + 1}.webp"
-
-
-def _links(stills: Sequence[Sequence[Still]]) -> str:
+def _links(stills: Sequence[Sequence[Still]], thumbnails: Sequence[str]) -> str:
     """A thumbnail of each view, which leads to it."""
     return "".join(
-        f'<a href="#view-{view + 1}"><img src="{_thumbnail(view)}" alt="" />{_said(row[0].view)}</a>'
-        for view, row in enumerate(stills)
+        f'<a href="#view-{view + 1}"><img src="{file}" alt="" />{_said(row[0].view)}</a>'
+        for view, (row, file) in enumerate(zip(stills, thumbnails, strict=True))
     )
 
 
@@ -156,11 +157,7 @@ def _said(name: str) -> str:
     return escape(printable(name))
 
 
-def _write_page(folder: Path, name: str, links: str, sections: str) -> None:
+def _page(name: str, links: str, sections: str) -> bytes:
     """`name` as a file has it; the others as HTML."""
-    with as_file(files("lambent.site").joinpath("stills_page")) as page:
-        for file in page.iterdir():
-            if file.suffix in (".js", ".css"):
-                write_bytes(folder / file.name, file.read_bytes())
-        template = Template((page / "index.html").read_text("utf-8"))
-    write_text(folder / "index.html", template.substitute(name=_said(name), links=links, sections=sections))
+    template = Template(files("lambent.site").joinpath("stills_page/index.html").read_text("utf-8"))
+    return template.substitute(name=_said(name), links=links, sections=sections).encode()

@@ -24,6 +24,7 @@ from lambent.core.errors import UserError
 from lambent.core.files import remove_left_over, write_text
 from lambent.core.inputs import read_bytes
 from lambent.core.machine import memory_bytes
+from lambent.core.outputs import check_new_folder
 from lambent.store.artefact import Array, Artefact, Chunk, Region, chunk_id
 from lambent.store.chunk_files import ChunkFiles
 from lambent.store.lock import WriterLock
@@ -57,9 +58,10 @@ class Store:
         Raises
         ------
         UserError
-            If the folder holds something else, or another process is writing the store.
+            If the folder holds something else or is named like a file, or another process is writing the store.
         """
         store = cls(folder)
+        check_new_folder(store.folder, "a store")
         if not (store.folder / MANIFEST).exists() and store.folder.exists():
             names = [path.name for path in store.folder.iterdir()]
             if not all(name.startswith(".") for name in names):  # hidden: left by a process that died early

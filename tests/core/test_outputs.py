@@ -16,7 +16,7 @@ import pytest
 from lambent.core import files
 from lambent.core.errors import UserError
 from lambent.core.files import atomic_path, check_place, remove_left_over, write_text
-from lambent.core.outputs import check_output, is_marked
+from lambent.core.outputs import OF_FILES, check_new_folder, check_output, is_marked
 from lambent.core.pictures.film import film_writer
 from lambent.core.pictures.images import read_image, write_image, write_shown
 from lambent.materials.plots import new_figure, save_figure
@@ -168,3 +168,22 @@ def test_other_files_are_replaced_by_force_alone(tmp_path: Path) -> None:
     assert not is_marked(tmp_path / "absent.png") and not is_marked(tmp_path)
     with pytest.raises(UserError, match=r"found \.txt; expected \.png"):
         check_output(tmp_path / "a.txt", (".png",), force=True)
+
+
+def test_folders_are_not_named_like_files(tmp_path):
+    from lambent.core.discovery import modules_in
+    from lambent.core.pictures.film import FILM
+    from lambent.core.pictures.images import WRITABLE
+    from lambent.materials import export
+    from lambent.scenes import loaders
+    from lambent.scenes.photometry.files import ENDINGS
+
+    modules = [*modules_in(loaders, having="ENDINGS").values(), *modules_in(export, having="ENDINGS").values()]
+    endings = {ending for module in modules for ending in module.ENDINGS} | {*WRITABLE, FILM, *ENDINGS}
+    assert endings <= set(OF_FILES)
+    for ending in ("", ".store", ".example.org", "-1.2", ".v2"):
+        check_new_folder(tmp_path / f"room{ending}", "a site")
+    (tmp_path / "old.json").mkdir()
+    check_new_folder(tmp_path / "old.json", "a site")
+    with pytest.raises(UserError, match=r"room\.GLB: names a file, and a site is a folder; .* such as room$"):
+        check_new_folder(tmp_path / "room.GLB", "a site")

@@ -77,7 +77,7 @@ class Endurance:
         process, started = _begun(work, folder)
         process.join()
         if process.exitcode != 0:
-            raise AssertionError(f"{work.__name__} ended with {process.exitcode}")
+            raise AssertionError(f"{work} ended with {process.exitcode}")
         return time.monotonic() - started
 
 

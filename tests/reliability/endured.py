@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
+from lambent import site
 from lambent.baking.bake import bake
+from lambent.baking.running.relit import Relit
+from lambent.baking.transport.view import View
 from lambent.core.views.camera import Camera
+from lambent.editing.session.session import Session
 from lambent.materials.document import Material
 from lambent.scenes.loaders.load import load_scene
 from lambent.scenes.scene import Scene
@@ -18,12 +24,15 @@ from lambent.site.stills import export_stills
 from lambent.store.kept.session import FILE, RoomState, WalkSession, read_session, write_session
 from lambent.store.kept.views import Views, change_views, read_views
 from lambent.store.store import Store
+from lambent.viewer.modes.edit import worker
 from tests.baking.small_scenes import TINY, room_with_step
 
+PAGE = Path(site.__file__).parent / "page"
 SAVES = 40  # of a session, in one run
 QUALITY = TINY.changed(
     "endured", geometry={"texels": 96}, light_map={"samples": (32, 32), "gather_samples": 8, "tile_texels": 40}
 )
+EDITS, RELIT, VIEW_PX = "tray.edits.json", "store.relight.store", (16, 12)
 EYE = Camera("eye", (0.6, 0.3, 0.8), (-0.8, -0.2, -0.4))
 
 
@@ -49,16 +58,16 @@ class Job:
     content: Callable[[Path], dict[str, bytes]]
 
 
-def arrays(folder: Path) -> dict[str, bytes]:
+def arrays(folder: Path, name: str = "store") -> dict[str, bytes]:
     """Keys and bytes of all arrays of a store; raises if one is not complete or not as it was written."""
-    with Store.open(folder / "store") as store:
+    with Store.open(folder / name) as store:
         return {one.name: one.key.encode() + store.read(one.name).tobytes() for one in store.artefacts()}
 
 
-def whole_arrays(folder: Path) -> None:
+def whole_arrays(folder: Path, name: str = "store") -> None:
     """Raise unless the store opens, and all arrays that claim to be complete can be read."""
-    if (folder / "store" / "manifest.json").exists():
-        with Store.open(folder / "store") as store:
+    if (folder / name / "manifest.json").exists():
+        with Store.open(folder / name) as store:
             for one in store.artefacts():
                 if store.availability(one.name)[0] == "complete":
                     store.read(one.name)
@@ -86,9 +95,13 @@ def bake_changed(folder: Path) -> None:
     bake(_step(0.3), folder / "store", quality=QUALITY, only=("light_map", "probe")).close()
 
 
-def bake_box(folder: Path) -> None:
+def bake_box(folder: Path, former: Callable[[Path], object]) -> None:
+    """A store, and an export of another state of its room, which the runs replace."""
     bake(load_scene("builtin:box"), folder / "store", quality=TINY).close()
-    (folder / "out").mkdir()
+    blue = RoomState(materials={"red": Material(name="red", kd=(0.05, 0.1, 0.7))})
+    write_session(folder / "store" / FILE, WalkSession(states={"blue": blue}))
+    former(folder)
+    (folder / "store" / FILE).unlink()
 
 
 def save_sessions(folder: Path) -> None:
@@ -123,14 +136,62 @@ def export_page(folder: Path) -> None:
 
 
 def whole_site(folder: Path) -> None:
-    """Raise unless the store is whole, and a manifest that says it is finished names files that are there."""
+    """Raise unless the store is whole, and a site: the former, or the one that replaces it."""
     whole_arrays(folder)
-    path = folder / "out" / "manifest.json"
-    manifest = json.loads(path.read_text()) if path.exists() else {}
-    for kind in ("buffer", "texture"):
-        for one in manifest.get("tables", {}).get(kind, ()):
-            data = one.get("data", {"inline": ""})
-            assert "inline" in data or (folder / "out" / data["file"]).is_file(), data["file"]
+    out = folder / "out"
+    manifest = json.loads((out / "manifest.json").read_text())
+    assert manifest["version"] == 1 and len(manifest["states"]) in (1, 2), "no whole manifest"
+    assert {one.name for one in PAGE.iterdir()} <= {one.name for one in out.iterdir()}
+    assert {name.split("/")[0] for name in files_of(manifest)} == {"data", "shaders"}
+    for name, size in files_of(manifest).items():
+        assert (out / name).is_file() and size in (None, (out / name).stat().st_size), name
+
+
+def files_of(value: object) -> dict[str, int | None]:
+    """All files that a manifest names, and their bytes where it says so."""
+    if not isinstance(value, dict | list):
+        return {}
+    found = {value["file"]: value.get("packed")} if isinstance(value, dict) and "file" in value else {}
+    if isinstance(value, dict) and "inline" in value:
+        found = {}
+    for one in value.values() if isinstance(value, dict) else value:
+        found |= files_of(one)
+    return found
+
+
+def whole_stills(folder: Path) -> None:
+    """Raise unless the store is whole, and a page of stills: the former, or the one that replaces it."""
+    whole_arrays(folder)
+    named = re.findall(r'src="(pictures/[^"]+)"', (folder / "out" / "index.html").read_text())
+    assert len(named) in (2, 3) and all((folder / "out" / one).is_file() for one in named), named
+
+
+def begin_edits(folder: Path) -> None:
+    """A session on one material of the tray; its view has no transport yet."""
+    tray = load_scene("builtin:teatray")
+    nickel = {"nickel": tray.materials["nickel"]}
+    Session.new("builtin:teatray", tray.cameras[0], nickel, size=VIEW_PX).save(folder / EDITS)
+
+
+def edit_view(folder: Path) -> None:
+    """What `lambent edit` bakes while its window is open: few lights, then more."""
+    worker.main(folder / EDITS, folder / "store", [2, 20])
+
+
+def bake_tray(folder: Path) -> None:
+    bake(load_scene("builtin:teatray"), folder / "store", quality=QUALITY, only=("geometry",)).close()
+
+
+def relight_view(folder: Path) -> None:
+    """What `lambent relight` bakes for a room with another material: a store of its own."""
+    tray = load_scene("builtin:teatray")
+    room = RoomState(materials={"nickel": tray.materials["nickel"].model_copy(update={"kd": (0.9, 0.6, 0.1)})})
+    Relit(folder / "store", room, View(tray.cameras[0], *VIEW_PX)).bake()
+
+
+def whole_relit(folder: Path) -> None:
+    whole_arrays(folder)
+    whole_arrays(folder, RELIT)
 
 
 def nothing(folder: Path) -> None:
@@ -141,8 +202,10 @@ JOBS = {
     "bake": Job(nothing, bake_first, whole_arrays, arrays),
     "rebake": Job(bake_first, bake_changed, whole_arrays, arrays),
     "session": Job(nothing, save_sessions, whole_session, saved),
-    "site": Job(bake_box, export_site, whole_site, files),
-    "stills": Job(bake_box, export_page, whole_arrays, files),
+    "site": Job(partial(bake_box, former=export_site), export_site, whole_site, files),
+    "edit": Job(begin_edits, edit_view, whole_arrays, arrays),
+    "relight": Job(bake_tray, relight_view, whole_relit, partial(arrays, name=RELIT)),
+    "stills": Job(partial(bake_box, former=export_page), export_page, whole_stills, files),
 }
 
 

@@ -54,6 +54,12 @@ def unpacked(site: Path, piece: dict) -> bytes:
     return b"".join(parts)
 
 
+def is_named_by(piece: dict, data: bytes) -> bool:
+    """Whether the name of a file is that of its data and packing."""
+    packing = {"packing": piece["packing"]} if "packing" in piece else {}
+    return hashlib.sha256(data + json.dumps(packing).encode()).hexdigest()[:20] in piece["file"]
+
+
 def test_every_file_is_there_and_holds_what_the_manifest_says(box_site):
     manifest = manifest_of(box_site)
     pieces = [one["data"] for kind in ("buffer", "texture") for one in manifest["tables"][kind] if "data" in one]
@@ -61,7 +67,7 @@ def test_every_file_is_there_and_holds_what_the_manifest_says(box_site):
     pieces += [piece["blocks"] for piece in pieces if "blocks" in piece]
     for piece in pieces:
         data = unpacked(box_site, piece)
-        assert len(data) == piece["bytes"] and hashlib.sha256(data).hexdigest()[:20] in piece["file"]
+        assert len(data) == piece["bytes"] and is_named_by(piece, data)
         assert "inline" in piece or (box_site / piece["file"]).stat().st_size == piece["packed"]
     assert all((box_site / one["file"]).is_file() for one in manifest["tables"]["shader_module"])
     assert all((box_site / name).is_file() for name in ("index.html", "main.js", "site.css", "poster.jpg"))
@@ -96,7 +102,7 @@ def test_states_hold_what_differs(box_site):
     assert "rgba16float" in changed, "the light map"
     assert all(blue["counts"][kind] >= count for kind, count in baked["counts"].items())
     pieces = [piece for kind in blue["changes"].values() for piece in kind.values()]
-    assert all(hashlib.sha256(unpacked(box_site, piece)).hexdigest()[:20] in piece["file"] for piece in pieces)
+    assert all(is_named_by(piece, unpacked(box_site, piece)) for piece in pieces)
 
 
 def test_a_frame_as_data_draws_what_the_renderer_draws(device, baked_box):
@@ -112,7 +118,7 @@ def test_a_frame_as_data_draws_what_the_renderer_draws(device, baked_box):
 
 
 @pytest.mark.long
-def test_an_interrupted_export_is_no_site_and_is_done_again(adapter, blue_box, box_site, tmp_path):
+def test_an_interrupted_export_leaves_what_was_there(adapter, blue_box, baked_box, box_site, tmp_path):
     def stop(done, total, what):
         if done:
             raise KeyboardInterrupt
@@ -120,8 +126,23 @@ def test_an_interrupted_export_is_no_site_and_is_done_again(adapter, blue_box, b
     with pytest.raises(KeyboardInterrupt):
         lambent.export(blue_box, tmp_path, progress=stop)
     assert manifest_of(tmp_path) == {"format": "lambent-site", "version": 0} and not (tmp_path / "index.html").exists()
+    lambent.export(baked_box, tmp_path)
+    former = {one: one.read_bytes() for one in tmp_path.rglob("*") if one.is_file()}
+    with pytest.raises(KeyboardInterrupt):
+        lambent.export(blue_box, tmp_path, progress=stop)
+    assert {one: one.read_bytes() for one in tmp_path.rglob("*") if one.is_file()} == former
     lambent.export(blue_box, tmp_path)
     assert manifest_of(tmp_path) == manifest_of(box_site)
+
+
+@pytest.mark.parametrize("name", ["room.glb", "page.HTML", "site.zip"])
+def test_the_name_of_a_file_is_refused(baked_box, tmp_path, name):
+    for as_ in ("site", "html"):
+        with pytest.raises(UserError, match=f"{name}: names a file, and an export is a folder; .* such as {name[:4]}"):
+            lambent.export(baked_box, tmp_path / name, as_=as_)
+    with pytest.raises(UserError, match="names a file, and a store is a folder"):
+        Store.create(tmp_path / name, {})
+    assert not any(tmp_path.iterdir())
 
 
 @pytest.mark.long

@@ -32,12 +32,14 @@ class Page(HTMLParser):
 
     def __init__(self, text: str) -> None:
         super().__init__()
-        self.tags, self.pictures, self.texts, self._open = [], [], {}, ""
+        self.tags, self.pictures, self.files, self.texts, self._open = [], [], [], {}, ""
         self.feed(text)
 
     def handle_starttag(self, tag, attrs):
         self.tags.append(tag)
         self._open = tag
+        if tag == "img" and "src" in dict(attrs):
+            self.files.append(dict(attrs)["src"])
         if tag == "img" and dict(attrs).get("alt"):
             self.pictures.append(dict(attrs))
 
@@ -70,6 +72,11 @@ def stills(store, tmp_path_factory):
     return folder
 
 
+def numbers(folder) -> list[str]:
+    """Views, and views with states, of the pictures of a page, whose names end in their hashes."""
+    return sorted(one.stem.rpartition("-")[0] for one in (folder / "pictures").iterdir())
+
+
 def test_the_page_names_every_still(stills):
     text = (stills / "index.html").read_text("utf-8")
     page = Page(text)
@@ -78,8 +85,8 @@ def test_the_page_names_every_still(stills):
     assert [one["alt"] for one in page.pictures] == [f"{view}, {s}" for view in ("front", VIEW.name) for s in STATES]
     captions = page.texts["figcaption"]
     assert all(re.fullmatch(r".*, EV100 -?\d+\.\d", one) for one in captions) and captions[5].startswith(HOSTILE)
-    files = {one.name for one in (stills / "pictures").iterdir()}
-    assert files == {"1.webp", "2.webp", *(f"{view}-{state}.webp" for view in (1, 2) for state in (1, 2, 3))}
+    assert numbers(stills) == ["1", "1-1", "1-2", "1-3", "2", "2-1", "2-2", "2-3"]
+    assert {one.relative_to(stills).as_posix() for one in (stills / "pictures").iterdir()} == set(page.files)
     assert "http:" not in text and "https:" not in text, "no third party is asked"
 
 
@@ -97,22 +104,28 @@ def test_stills_are_those_of_the_store(store, stills):
 
 
 def picture(folder, view: int, state: int):
-    return np.asarray(Image.open(folder / f"pictures/{view}-{state}.webp").convert("RGB"), float)
+    (file,) = (folder / "pictures").glob(f"{view}-{state}-*.webp")
+    return np.asarray(Image.open(file).convert("RGB"), float)
 
 
 @pytest.mark.long
-def test_an_interrupted_export_says_so_and_is_done_again(store, tmp_path):
+def test_an_interrupted_export_leaves_what_was_there(store, tmp_path):
     def stop(done, total, what):
         if done > 0.5 * total:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         lambent.export(store, tmp_path, as_="html", size=(32, 24), progress=stop)
-    assert "unfinished" in (tmp_path / "index.html").read_text("utf-8")
-    (tmp_path / "pictures/old.webp").write_bytes(b"old")
+    assert not (tmp_path / "index.html").exists() and numbers(tmp_path) == []
     lambent.export(store, tmp_path, as_="html", size=(32, 24), views=["front"])
-    assert {one.name for one in (tmp_path / "pictures").iterdir()} == {"1.webp", "1-1.webp", "1-2.webp", "1-3.webp"}
-    assert "unfinished" not in (tmp_path / "index.html").read_text("utf-8")
+    assert numbers(tmp_path) == ["1", "1-1", "1-2", "1-3"]
+    former = {one: one.read_bytes() for one in tmp_path.rglob("*") if one.is_file()}
+    with pytest.raises(KeyboardInterrupt):
+        lambent.export(store, tmp_path, as_="html", size=(48, 36), progress=stop)
+    assert {one: one.read_bytes() for one in tmp_path.rglob("*") if one.is_file()} == former
+    (tmp_path / "pictures/old.webp").write_bytes(b"old")
+    lambent.export(store, tmp_path, as_="html", size=(48, 36))
+    assert len(numbers(tmp_path)) == 8
     with pytest.raises(UserError, match="holds other files than a site"):
         lambent.export(store, tmp_path)
 
