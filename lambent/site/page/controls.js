@@ -2,7 +2,7 @@
 
 import { found, offer } from "./elements.js";
 import { keep, share } from "./keeping.js";
-import { failed, say, tellRest } from "./messages.js";
+import { say, tellRest } from "./messages.js";
 import { cameraAlong } from "./paths.js";
 
 /** @import { Visit } from "./visit.js" */
@@ -24,10 +24,10 @@ export function openPanel(visit) {
     visit.view(cameras[number]);
     say(cameras[number].name);
   });
-  const markWalk = offer("walks", namesOf(about.paths), (number) => walk(visit, about.paths[number]).catch(failed));
+  const markWalk = offer("walks", namesOf(about.paths), (number) => walk(visit, about.paths[number]));
   offerLook(visit);
   found("share").onclick = () => share(visit);
-  found("save").onclick = () => keep(visit).catch(failed);
+  found("save").onclick = () => keep(visit);
   visit.addEventListener("change", () => {
     markState(visit.state);
     markWalk(namesOf(about.paths).indexOf(visit.motion?.name ?? ""));

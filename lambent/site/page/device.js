@@ -25,6 +25,10 @@ function missing() {
   return "WebGPU finds no graphics adapter: turn on hardware acceleration in the browser, or update the graphics driver.";
 }
 
+/** What a device says of what it cannot do. @param {GPUError} error */
+export const refusal = ({ message }) =>
+  `The graphics device cannot show the room: ${message.split("\n")[0] || "no memory"}`;
+
 /** @param {any} manifest @returns {Promise<GPUDevice>} */
 export async function openDevice(manifest) {
   const adapter = await navigator.gpu?.requestAdapter({ powerPreference: "high-performance" });

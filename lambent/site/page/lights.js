@@ -1,7 +1,7 @@
 // Sliders of the room's light groups: brightness and colour temperature, as in the window's Light panel.
 
 import { element, found } from "./elements.js";
-import { failed, tellRest } from "./messages.js";
+import { tellRest } from "./messages.js";
 import { factorOf, Mixing } from "./mixing.js";
 
 /** @import { Light } from "./address.js" */
@@ -71,7 +71,7 @@ export class Lights {
       (name, i) =>
         new Row(name, this.bodies.sliderK, (change, rests) => {
           this.mixes[i] = change ? { ...this.mixes[i], ...change } : this.own[i];
-          this.change(rests);
+          this.update(rests);
         }),
     );
     const reset = element("button", { textContent: "Reset light", onclick: () => this.restore({}) });
@@ -110,19 +110,14 @@ export class Lights {
       const isK = kelvin >= lowK && kelvin <= highK;
       return { ...mix, intensity: Math.min(intensity, MOST_INTENSITY), kelvin: isK ? kelvin : null };
     });
-    this.change(true);
-  }
-
-  /** Show what is wanted; with probes and skies if it `rests`. @param {boolean} rests */
-  change(rests) {
-    this.update(rests).catch(failed);
+    this.update(true);
   }
 
   get factors() {
     return this.mixes.map((mix) => factorOf(mix, this.bodies));
   }
 
-  /** @param {boolean} rests */
+  /** Show what is wanted; with probes and skies if it `rests`. @param {boolean} rests */
   async update(rests) {
     const { mixing, visit } = this,
       wanted = ++this.asked;

@@ -8,26 +8,25 @@ export class SiteError extends Error {}
 /** A fault of a file: it may come if it is asked for again. */
 export class FileError extends SiteError {}
 
-/** @param {string} file relative to the page @returns {Promise<Response>} */
+/** @param {string} file relative to the page @returns {Promise<Blob>} */
 async function fetched(file) {
-  let answer;
-  try {
-    answer = await fetch(new URL(file, import.meta.url));
-  } catch {
-    throw new FileError(`${file} cannot be fetched; is the server still there?`);
-  }
-  if (!answer.ok) throw new FileError(`${file} cannot be fetched (${answer.status} ${answer.statusText})`);
-  return answer;
+  const answer = await fetch(new URL(file, import.meta.url)).catch(() => null);
+  if (answer && !answer.ok) throw new FileError(`${file} cannot be fetched (${answer.status} ${answer.statusText})`);
+  const content = await answer?.blob().catch(() => null);
+  if (content) return content;
+  throw new FileError(`${file} ${answer ? "did not arrive whole" : "cannot be fetched"}; is the server still there?`);
 }
 
-/** @returns {Promise<any>} the manifest, of a version that this page reads */
+/** @returns {Promise<any>} the manifest, as it was exported; browsers can tell on pages from https and localhost */
 export async function readManifest() {
-  const found = await (await fetched("manifest.json")).json();
-  if (found.version === 0) throw new SiteError("This site is unfinished; export it again");
-  if (found.format !== "lambent-site" || found.version !== 1) {
-    throw new SiteError(`manifest.json is ${found.format} ${found.version}; this page reads lambent-site 1`);
-  }
-  return found;
+  const text = await readText("manifest.json"),
+    [, version, sum, rest = ""] = /^{"format":"lambent-site","version":(\d+),"sha256":"(\w+)",(.*)$/s.exec(text) ?? [],
+    bytes = new Uint8Array((await crypto.subtle?.digest("SHA-256", new TextEncoder().encode(rest))) ?? []);
+  if (version && version !== "1")
+    throw new SiteError(`manifest.json has version ${version}; this page reads version 1`);
+  const found = Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
+  if (!version || (found && found !== sum)) throw new SiteError("manifest.json is damaged; export the site again");
+  return JSON.parse(`{${rest}`);
 }
 
 /** @param {string} file @returns {Promise<string>} */
@@ -192,13 +191,7 @@ export class Data {
 
   /** @param {Piece} piece @returns {Promise<ArrayBuffer | ImageBitmap>} */
   async unpacked(piece) {
-    const answer = piece.inline ? new Response(bytesIn(piece.inline)) : await fetched(piece.file);
-    let packed;
-    try {
-      packed = await answer.blob();
-    } catch {
-      throw new FileError(`${piece.file} did not arrive whole; is the server still there?`);
-    }
+    const packed = piece.inline ? new Blob([bytesIn(piece.inline)]) : await fetched(piece.file);
     const content = await (piece.picture ? picture(packed) : bytesOf(piece, packed)).catch(() => null);
     if (!content) throw new FileError(`${piece.file} is damaged; export the site again`);
     this.report((this.done += piece.packed));

@@ -2,13 +2,13 @@
 
 import { openCard } from "./card.js";
 import { openPanel } from "./controls.js";
-import { openDevice } from "./device.js";
+import { openDevice, refusal } from "./device.js";
 import { found } from "./elements.js";
 import { Frame } from "./frame.js";
 import { follow } from "./input.js";
 import { offerLights } from "./lights.js";
-import { Data, neededAgain, readManifest } from "./loading.js";
-import { failed, forgive, tell, tellRest } from "./messages.js";
+import { Data, neededAgain, readManifest, SiteError } from "./loading.js";
+import { caught, failed, forgive, tell, tellRest } from "./messages.js";
 import { readGeometry } from "./picking.js";
 import { Visit } from "./visit.js";
 
@@ -44,6 +44,7 @@ async function open() {
   const { vertices, indices } = manifest.visit.geometry,
     files = [vertices, indices].map((at) => manifest.tables.buffer[at].data.file); // for clicks, too
   const data = new Data(report, new Set([...neededAgain(manifest), ...files]));
+  device.onuncapturederror = ({ error }) => failed(new SiteError(refusal(error)));
   device.lost.then((info) => {
     if (info.reason === "destroyed") return;
     tell("The graphics device was lost; loading the room again…");
@@ -77,12 +78,13 @@ function begin(here) {
 const again = () => (shown && visit?.data ? shown.show(visit.state, visit.data) : open());
 
 /** @param {() => Promise<void>} act */
-const attempt = (act) => act().then(() => tellRest(""), failed);
+const attempt = (act) => act().then(() => tellRest(""));
 
 /** @type {Visit | undefined} */
 let visit;
 /** @type {Frame | undefined} that shows the room on the present device */
 let shown;
+for (const kind of ["error", "unhandledrejection"]) addEventListener(kind, caught);
 found("again").onclick = () => {
   forgive();
   attempt(again);

@@ -29,7 +29,15 @@ export function failed(error) {
   message.textContent =
     error instanceof SiteError ? error.message : `The room cannot be shown: ${error.message ?? error}`;
   retry.hidden = !(error instanceof FileError);
-  if (!(error instanceof SiteError)) throw error;
+  if (!(error instanceof SiteError)) console.error(error);
+}
+
+/** Say of what fails anywhere, but in browsers' extensions. @param {any} event */
+export function caught(event) {
+  const error = event.error ?? event.reason;
+  if (!error || /-extension:/.test(error.stack)) return;
+  event.preventDefault();
+  failed(error);
 }
 
 /** Say nothing more of the last fault. */

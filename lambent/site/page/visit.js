@@ -2,7 +2,7 @@
 
 import { addressOf, cameraAddress, readAddress } from "./address.js";
 import * as c from "./camera.js";
-import { failed, say, tellRest } from "./messages.js";
+import { say, tellRest } from "./messages.js";
 import { glide, isFloor, standingAt, turned } from "./moves.js";
 import { along, minus } from "./vectors.js";
 
@@ -203,11 +203,7 @@ export class Visit extends EventTarget {
   async choose(number, label = this.manifest.states[number].name) {
     this.state = number;
     this.changed();
-    try {
-      if (this.data) await this.frame?.show(number, this.data);
-    } catch (error) {
-      return failed(error);
-    }
+    if (this.data) await this.frame?.show(number, this.data);
     tellRest("");
     say(label);
     document.body.dataset.state = this.manifest.states[number].name;
