@@ -166,10 +166,10 @@ def _content(path: Path, limit_bytes: int) -> bytes:
     """Content of a file; empty if it is missing."""
     try:
         return read_bytes(path, limit_bytes)
-    except UserError:
-        if path.exists():
-            raise
-        return b""
+    except UserError as error:
+        if isinstance(error.__cause__, FileNotFoundError):  # asked later, it may be there: writers make journals anew
+            return b""
+        raise
 
 
 def content_size(frame: bytes) -> int:

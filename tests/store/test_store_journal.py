@@ -15,6 +15,7 @@ import pytest
 import zarr
 
 from lambent.core.errors import UserError
+from lambent.store import chunk_files
 from lambent.store import store as store_module
 from lambent.store.store import Store, Writer
 
@@ -315,3 +316,22 @@ for value in range(2, 100_000):
         if process.stdout is not None:
             process.stdout.close()
     assert len(seen) >= 12, "it was rewritten meanwhile"
+
+
+def test_a_journal_that_a_writer_makes_anew_meanwhile_is_read_as_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    filled(tmp_path / "s", 2)._store.close()
+    journal = tmp_path / "s/a/journal"
+    store, found = Store.open(tmp_path / "s"), chunk_files.read_bytes
+
+    def read(path: Path, limit_bytes: int) -> bytes:
+        try:
+            return found(path, limit_bytes)
+        finally:
+            if path == journal:
+                journal.write_bytes(b"")
+
+    monkeypatch.setattr(chunk_files, "read_bytes", read)
+    store.refresh()
+    assert store.availability("a") == ("complete", 1.0)

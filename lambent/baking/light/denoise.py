@@ -123,7 +123,7 @@ def denoise(irradiance: Floats) -> Floats:
         _filtered(pyoidn.OIDN_FILTER_TYPE_RT_LIGHTMAP, images, scale=scale)[RIM:-RIM, RIM:-RIM]
         for scale in (None, EXPOSED / mean)
     )
-    share = 1 / (1 + (luminance(dark) / (DARK * mean)) ** 2)
+    share = 1 / (1 + (luminance(np.asarray(dark, np.float64)) / (DARK * mean)) ** 2)  # squares exceed 32 bits
     return bright + share[..., None] * (dark - bright)
 
 
