@@ -1,4 +1,4 @@
-"""Unseen surfaces: flush sheets, odd uv and textures, extreme materials, cameras where nobody stands."""
+"""Unseen surfaces: flush sheets, odd uv and textures, extreme materials, measured tables, odd cameras."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ import numpy as np
 import trimesh
 from PIL import Image
 
+import lambent
+from lambent.materials.document import Material
 from tests.generated.light import lit
+from tests.generated.measurements import ANGLES, GLOSSY, damaged, grid, measured, written
 from tests.generated.rooms import between
 from tests.generated.written import Look, Piece, Room, glb, lamp, metallic, panel
 
@@ -153,3 +156,54 @@ def gltf_extremes(folder: Path) -> Path:
         pieces.append(Piece(f"ball {number}", ball, number, place))
     return glb(folder / "extremes.glb", pieces, json.loads(json.dumps(kinds)),
                extensionsUsed=["KHR_materials_emissive_strength"])  # fmt: skip
+
+
+def _tabled(folder: Path, room: Room, text: str) -> Path:
+    """A room whose steel and wood are a measured table, as docs/fitting.md has it: fitted, and scattering by itself."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "table.txt").write_text(text)
+    lambent.read(folder / "table.txt").fit(progress=False).material.save(folder / "table.json")
+    return room.written(folder)
+
+
+def _of_table(name: str, more: str = "") -> Look:
+    drawn = 'file = "table.json"'
+    table = '\n[measured]\nsteel = "table.txt"\nwood = "table.txt"\n'
+    return Look(name, {"steel": drawn, "wood": drawn}, more=table + more)
+
+
+def damaged_table(folder: Path) -> Path:
+    """Under a lamp, a gloss whose peak is cut off at a third, and of whose rows an eighth are below zero."""
+    angles_deg = grid(theta_o=range(0, 86, 2), phi_o=range(0, 360, 10))
+    f = measured(angles_deg, GLOSSY)
+    text, _ = damaged(written(angles_deg, np.minimum(f, 0.3 * f.max())), 0.12, "-.01 -.01 -.01")
+    room = Room(_of_table("damaged_table", lamp())).furnish()
+    panel(room.add)
+    return _tabled(folder, room, text)
+
+
+def one_wavelength(folder: Path) -> Path:
+    """By a window, a gloss that was measured at 550 nm alone."""
+    angles_deg = grid(theta_i=range(0, 76, 15), theta_o=range(0, 86, 5))
+    text = written(angles_deg, measured(angles_deg, GLOSSY)[:, :1], (*ANGLES, "f_550nm"))
+    return _tabled(folder, _windowed(_of_table("one_wavelength")), text)
+
+
+def sixteen_wavelengths(folder: Path) -> Path:
+    """By a window, a glossy red from 400 to 700 nm in steps of 20, more saturated than a screen's."""
+    wavelengths_nm = np.arange(400, 701, 20)
+    angles_deg = grid(theta_i=range(0, 76, 15), theta_o=range(0, 86, 5))
+    red = 0.4 / np.pi / (1 + np.exp((610 - wavelengths_nm) / 5))
+    f = measured(angles_deg, Material(name="gloss", kd=0.0, lobes=GLOSSY.lobes))[:, :1] + red
+    text = written(angles_deg, f, (*ANGLES, *(f"f_{nm}nm" for nm in wavelengths_nm)))
+    return _tabled(folder, _windowed(_of_table("sixteen_wavelengths")), text)
+
+
+def _windowed(look: Look) -> Room:
+    """The furnished room, in daylight that enters by a window of 2 m by 1.3 m."""
+    room = Room(look).furnish()
+    room.scene.delete_geometry("wall_right")
+    for number, (low, high) in enumerate([((0, -2.7), (2.6, -1.8)), ((0, 0.2), (2.6, 2.7)), ((0, -1.8), (0.9, 0.2)),
+                                          ((2.2, -1.8), (2.6, 0.2))]):  # fmt: skip
+        room.add(between((2.0, *low), (2.2, *high)), f"wall_right_{number}")
+    return room

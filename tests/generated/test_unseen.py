@@ -12,10 +12,10 @@ from lambent.core.errors import UserError
 from lambent.scenes.loaders.load import load_scene
 from lambent.store.contract import SIDES
 from tests.baking.small_scenes import TINY
-from tests.generated.unseen import READABLE, UNSEEN, misses
+from tests.generated.unseen import NOISY, READABLE, TILE, UNSEEN, compared, misses
 
 REFUSED = {"sun_below": "the sun is below the horizon", "sharpest": "lobes.0.mx: must be greater"}
-LARGE = {"cad_nodes", "million", "texture_8k"}
+LARGE = {"cad_nodes", "million", "texture_8k", "damaged_table", "one_wavelength", "sixteen_wavelengths"}
 BAKED = ("broken", "inside_out", "leak_0mm")  # others with --long
 
 
@@ -57,3 +57,17 @@ def test_a_row_names_what_it_misses() -> None:
     assert misses({"outcome": "refused: scene.toml: kd"}) == []
     assert misses({"outcome": "fault: code 1, ValueError"}) == ["fault: code 1, ValueError"]
     assert misses({"outcome": "baked", "dark": 0.1}) == ["not dark"]
+
+
+def test_noisy_paths_are_compared_by_means_of_squares() -> None:
+    rest, random = np.full((108, 192, 3), 0.5, np.float32), np.random.default_rng(0)
+    quiet, noisy = (
+        [rest * random.gamma(1 / spread, spread, (108, 192, 1)).astype(np.float32) for _ in range(2)]
+        for spread in (0.001, 1.0)
+    )
+    assert "of_pixels" not in compared(rest, *quiet)
+    row = compared(rest, *noisy)
+    assert row["of_pixels"] > 1 and row["noise"] <= NOISY and not misses({"outcome": "baked", **row})
+    holed = rest.copy()
+    holed[32:48, 64:80] = 0
+    assert compared(holed, *noisy)["worst_tile"] > TILE > row["worst_tile"]

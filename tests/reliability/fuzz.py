@@ -2,10 +2,10 @@
 
     python -m tests.reliability.fuzz --reader EULUMDAT --minutes 10
 
-Every sound file of the readers whose name holds NAME has its own process and an equal share of the time. atheris, where
-it is installed, guides by branches of `lambent`; otherwise hypothesis draws mutations, guided by what readers say.
-Files with something new are kept in `--corpus`, where the next run begins. Faults are those of `mutate`, and a process
-that ends; each is kept.
+Every sound file of the readers whose name holds NAME has its own process and an equal share of the processor's minutes.
+atheris, where it is installed, guides by branches of `lambent`; otherwise hypothesis draws mutations, guided by what
+readers say. Files with something new are kept in `--corpus`, where the next run begins. Faults are those of `mutate`,
+and a process that ends; each is kept.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ import os
 import re
 import resource
 import shutil
-import signal
 import sys
 import tempfile
 import time
@@ -36,7 +35,6 @@ CORPUS = ROOT / "out/fuzz"
 OF_STRUCTURE = 0.5  # share of mutations that know the file's structure; the others are libFuzzer's
 MOST_LENGTHS = 4  # of the sound file, and at least 4096 bytes
 REPORT_S = 2.0
-GRACE_S = 300.0  # beyond its time, after which a process counts as hung
 INSTRUMENTED = ("lambent.core", "lambent.materials", "lambent.scenes", "lambent.store", "lambent.published",
                 "lambent.editing.session")  # fmt: skip
 
@@ -60,8 +58,8 @@ def instrumented() -> Any:
 
 
 def fuzz_one(number: int, seconds: float, corpus: Path, folder: Path, report: Path) -> None:
-    """Break the sound file with this number until the time is over; does not return."""
-    from tests.reliability.mutate import MOST_BYTES, Bench, Result, attempt, bounded
+    """Break the sound file with this number for so many seconds of the processor; does not return."""
+    from tests.reliability.mutate import LONGEST_S, MOST_BYTES, Bench, Result, attempt, bounded
     from tests.reliability.readers import sound
 
     warnings.simplefilter("ignore")
@@ -69,12 +67,13 @@ def fuzz_one(number: int, seconds: float, corpus: Path, folder: Path, report: Pa
     bench, result, whole = Bench(folder), Result(), one.files[one.broken]
     with instrumented():
         one.use(bench.lay_out(one) / one.main)  # imports and caches are warm
-    begin_bytes, begin, next_report = _peak_bytes(), time.monotonic(), 0.0
+    begin_bytes, begin, next_report = _peak_bytes(), time.process_time(), 0.0
 
     def use(content: bytes) -> str:
         nonlocal next_report
+        faulthandler.dump_traceback_later(100 * LONGEST_S, exit=True)  # code that never returns to Python
         told = attempt(bench, one, content, result, corpus / "faults", f"{number}-{len(result.failures)}")
-        spent = time.monotonic() - begin
+        spent = time.process_time() - begin
         if spent > min(seconds, next_report):
             result.counts[one.reader].peak_mb = (_peak_bytes() - begin_bytes) / 2**20
             report.write_text(json.dumps({**asdict(result), "seconds": spent}))
@@ -149,7 +148,7 @@ def _peak_bytes() -> int:
 
 
 def fuzz(reader: str, minutes: float, corpus: Path) -> tuple[Any, dict[str, float]]:
-    """The counts and failures of the readers whose name holds `reader`, and the minutes of each."""
+    """The counts and failures of the readers whose name holds `reader`, and the processor's minutes of each."""
     with instrumented():
         from tests.reliability.mutate import IN_MEMORY, Count, Result
         from tests.reliability.readers import numbers_of, sound
@@ -187,19 +186,15 @@ def _in_a_process(number: int, seconds: float, corpus: Path, folder: Path) -> tu
         except BaseException:  # noqa: BLE001 - the child must not go on as its parent
             traceback.print_exc()
         os._exit(1)
-    latest = time.monotonic() + seconds + GRACE_S
-    while not (ended := os.waitpid(child, os.WNOHANG))[0]:
-        if time.monotonic() > latest:
-            os.kill(child, signal.SIGKILL)
-        time.sleep(0.2)
+    _, ended = os.waitpid(child, 0)
     found = json.loads(report.read_text()) if report.is_file() else {"counts": {}, "failures": {}, "seconds": 0.0}
-    return found, ended[1]
+    return found, ended
 
 
 def main() -> None:
     options = argparse.ArgumentParser()
     options.add_argument("--reader", default="")
-    options.add_argument("--minutes", type=float, default=1.0)
+    options.add_argument("--minutes", type=float, default=1.0, help="of the processor")
     options.add_argument("--corpus", type=Path, default=CORPUS)
     given = options.parse_args()
     faulthandler.enable()
@@ -208,7 +203,7 @@ def main() -> None:
 
     print("guided by", "branches (atheris)" if guided() else "what readers say (hypothesis)")  # noqa: T201
     print(table(result))  # noqa: T201
-    print("\n".join(f"{name}: {minutes:.1f} minutes" for name, minutes in spent.items()))  # noqa: T201
+    print("\n".join(f"{name}: {minutes:.1f} minutes of the processor" for name, minutes in spent.items()))  # noqa: T201
     for key, times in result.failures.items():
         print(f"{times} x {key}")  # noqa: T201
     sys.exit(bool(result.failures))
