@@ -13,6 +13,9 @@ from lambent.scenes.scene import Mesh, Scene
 
 LARGE, SMALL = 500.0, 0.05  # metres
 ALL_LIGHT = 1.001  # diffuse reflectance; fits and conversions round
+# Of the light in a closed room of this reflectance, 27 % pass more surfaces than a path. A white room lost 9 % of its
+# light although its furniture absorbed the rest. Paint reflects .9, white plastic in glTF .96.
+WHITE = 0.98
 # Half of the objects of rooms in metres are smaller than 2 m, of rooms in centimetres than 200.
 THING_M, THINGS = 20.0, 3
 
@@ -57,13 +60,16 @@ def size_warnings(scene: Scene) -> list[str]:
 
 
 def reflectance_warnings(scene: Scene) -> list[str]:
-    """A warning for each material of an object whose diffuse terms alone reflect more light than arrives."""
+    """A warning for each material of an object whose diffuse terms reflect almost all light, or more than arrives."""
     used = dict.fromkeys(o.material for o in scene.objects)
     shares = {name: float(np.max(np.add(m.kd, m.kt_d))) for name in used if (m := scene.materials.get(name))}
+    white = "closed rooms of it become too dark, because paths end before their light does"
     return [
         f"material {name}: reflects more light than arrives ({share:.3g}): light grows from surface to surface"
-        for name, share in shares.items()
         if share > ALL_LIGHT
+        else f"material {name}: reflects almost all light ({share:.3g}): {white}"
+        for name, share in shares.items()
+        if share >= WHITE
     ]
 
 

@@ -94,3 +94,12 @@ def test_a_material_that_makes_light_is_named() -> None:
     assert not reflectance_warnings(scene)
     bright = replace(scene, materials={"grey": GREY.model_copy(update={"kd": (0.9, 0.2, 0.2), "kt_d": (0.5, 0, 0)})})
     assert "material grey: reflects more light than arrives (1.4)" in reflectance_warnings(bright)[0]
+
+
+def test_a_material_that_keeps_light_for_longer_than_paths_is_named() -> None:
+    def said(kd: float) -> list[str]:
+        grey = GREY.model_copy(update={"kd": (kd, 0.5, 0.5)})
+        return reflectance_warnings(replace(scene_of(FLOOR), materials={"grey": grey}))
+
+    assert not said(0.96)  # white in glTF
+    assert "material grey: reflects almost all light (1): closed rooms of it become too dark" in said(1.0)[0]
