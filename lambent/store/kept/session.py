@@ -12,7 +12,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from lambent.core.ceilings import SESSION_BYTES
 from lambent.core.errors import UserError, invalid
@@ -182,6 +182,16 @@ class EditedView(Strict):
     document: dict[str, Any]
     room: dict[str, Material] = Field(default={}, exclude_if=lambda one: not one)
     shown: tuple[str, ...] = Field(default=(), exclude_if=lambda one: not one)
+
+    @field_validator("document")
+    @classmethod
+    def _is_finite(cls, document: dict[str, Any]) -> dict[str, Any]:
+        """Readers of the document refuse other numbers, and a file of JSON cannot keep them."""
+        try:
+            json.dumps(document, allow_nan=False)
+        except ValueError as error:
+            raise ValueError("a number is not finite") from error
+        return document
 
 
 class WalkSession(Strict):

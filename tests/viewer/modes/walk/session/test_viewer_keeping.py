@@ -325,6 +325,10 @@ def viewed(**changes):
         (viewed(look={"exposure_ev": 100}), "view.look.exposure_ev"),
         (viewed(look={"scale": {"low": 5, "high": 1}}), "is not a luminance range; found 5:1"),
         (viewed(size=[0, 100]), "view.size"),
+        (
+            {"edited": {"desk": {"document": {"crease_deg": float("inf")}}}},
+            "edited.desk.document: a number is not finite",
+        ),
     ],
 )
 def test_a_session_that_cannot_be_read_is_one_line_and_is_kept(window, tmp_path, change, words):
