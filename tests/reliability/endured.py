@@ -6,8 +6,10 @@ import json
 import re
 import shutil
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
 from functools import partial
+from io import StringIO
 from pathlib import Path
 
 from lambent import site
@@ -175,7 +177,8 @@ def begin_edits(folder: Path) -> None:
 
 def edit_view(folder: Path) -> None:
     """What `lambent edit` bakes while its window is open: few lights, then more."""
-    worker.main(folder / EDITS, folder / "store", [2, 20])
+    with redirect_stdout(StringIO()):  # progress, for the window
+        worker.main(folder / EDITS, folder / "store", [2, 20])
 
 
 def bake_tray(folder: Path) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import re
+from codecs import BOM_UTF8
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -36,10 +37,10 @@ say(said);"""
 
 
 def broken(site: Any, count: int, seed: int) -> list[bytes]:
-    """Manifests after random mutations of bytes, words and structure; none is as before."""
+    """Manifests after random mutations; none is as before, but for a mark of its encoding."""
     whole = (site / "manifest.json").read_bytes()
     found = [mutate(whole, [whole[: len(whole) // 2], b"{}"], np.random.default_rng([seed, n])) for n in range(count)]
-    return [one for one in found if one != whole]
+    return [one for one in found if one.removeprefix(BOM_UTF8) != whole]
 
 
 def set_in(*path: Any) -> Callable[[dict[str, Any]], None]:
@@ -68,9 +69,9 @@ TEXTS: dict[str, Callable[[bytes], bytes]] = {  # of the file
 
 def test_every_change_is_noticed(javascript, box_site) -> None:
     whole = (box_site / "manifest.json").read_bytes()
-    texts = [whole, *(change(whole) for change in TEXTS.values()), *broken(box_site, 300, 0)]
+    texts = [whole, *(change(whole) for change in TEXTS.values()), *broken(box_site, 60, 0)]
     first, *said = javascript(READ, [base64.b64encode(one).decode() for one in texts])
-    assert first == manifest_of(box_site)["name"] and len(said) > 300
+    assert first == manifest_of(box_site)["name"] and len(said) > 60
     assert {re.sub(r"version \d+;", "version 2;", one) for one in said} <= {DAMAGED, OTHER}
 
 
