@@ -106,7 +106,7 @@ def bake(
         For `only` with "interreflection".
     on : int or str, optional
         A number of processes of this machine, or the address of a Dask scheduler, such as "tcp://10.0.0.1:8786", whose
-        workers trace interreflections; by default this process.
+        workers trace light maps, probes and interreflections; by default this process.
     note : callable, optional
         Called with sentences about what is baked for interreflections.
     progress : bool or callable, optional
@@ -222,9 +222,9 @@ class _Request:
         if INTERREFLECTION in (only or ()):
             return
         given = [option for option in ("fixed", "editable", "merge") if wanted is not None and getattr(wanted, option)]
-        if given or on is not None:
+        if given:
             hint = "add --only interreflection"
-            raise UserError("applies to interreflections only", field=f"--{[*given, 'on'][0]}", hint=hint)
+            raise UserError("applies to interreflections only", field=f"--{given[0]}", hint=hint)
 
     def proposed(self, wanted: Interreflection, progress: Progress) -> list[Proposal]:
         """A proposal for each view."""

@@ -106,7 +106,8 @@ def bake(
     environment : ImageEnvironment, optional
         Lights the views instead of the scene's own environment.
     workers : Workers, optional
-        Trace "interreflection", tile by tile: see `lambent.baking.running.cluster.opened`. By default this process.
+        Trace light maps, probes and interreflections: see `lambent.baking.running.cluster.opened`. By default this
+        process.
     watch : Watch, optional
         Notified of finished artefacts, and of regions of the light map before that.
 

@@ -100,7 +100,7 @@ def command(
     ] = False,
     on: Annotated[
         str | None,
-        typer.Option(help="Interreflections: trace on N processes of this machine, or on a cluster: tcp://HOST:PORT."),
+        typer.Option(help="Trace on N processes of this machine, or on a Dask cluster: tcp://HOST:PORT."),
     ] = None,
     crease_angle: CreaseAngle = None,
     json: Json = False,

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import drjit as dr
 import numpy as np
 
-from lambent.baking.light.sampling import path_traced, tile_samples
+from lambent.baking.light.sampling import Sampling, TexelJob, tile_samples
 from lambent.baking.probes.planes import _packed
 from lambent.baking.probes.probe import MOST, Surroundings, _blocks_needed, bake_probe
 from lambent.baking.surfaces import atlas as atlases
@@ -36,11 +36,11 @@ def test_tiles_of_any_number_of_texels_share_their_kernels() -> None:
     atlas = atlases.unwrap(scene, 48)
     texels = texels_of(atlases.merged(atlas), atlas.width, atlas.height)
     sides, built = Sides(texels, 1.0, np.ones(texels.face.shape, bool)), SceneBuilder(scene).build()
-    how = path_traced((4, 4), 0.0, 32)
+    how = Sampling((4, 4), 0.0, 32, 2)
 
     def tile(size: int) -> Callable[[], object]:
         region = (slice(0, 2), slice(8, 8 + size), slice(8, 8 + size), slice(0, 4))
-        return lambda: tile_samples(built, sides, region, 0, how)
+        return lambda: tile_samples(built, TexelJob.of(sides, region, 0), how)
 
     one, two = kernels(tile(9)), kernels(tile(14))
     assert one and one == two

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from lambent.baking.context import BakeContext
 from lambent.baking.methods import sorts_light
 from lambent.baking.quality import QualityName
 from lambent.baking.running.keys import key_of
-from lambent.baking.running.tiles import run_tiles
+from lambent.baking.running.tiles import run_jobs, run_tiles
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.store.contract import SIDES, probe_name, shared_probes
 from lambent.store.light_groups import group_name
@@ -173,7 +173,8 @@ def _direct_by_group(context: BakeContext, side: int, lit: Floats, known: Flags,
 def _direct_samples(context: BakeContext, side: int) -> Indices:
     """Sample direct light of a side, by group too; returns the charts that viewers see (H, W)."""
     from lambent.baking.light.groups import BothWriters
-    from lambent.baking.light.sampling import Sampling, tile_samples
+    from lambent.baking.light.sampling import TexelJob
+    from lambent.baking.light.tiles import Stage, TileSampler
     from lambent.baking.tracing.group_tally import Direct
 
     how: Settings = context.settings(KIND)
@@ -183,18 +184,18 @@ def _direct_samples(context: BakeContext, side: int) -> Indices:
     writer: Writer | BothWriters = whole
     grouped, depth = sorts_light(context.methods), context.settings("light_map").max_depth
     half = max(1, (how.lobe_samples if grouped else how.direct_samples) // 2)
-    sampling = Sampling((2 * half, 2 * half), 0.0, depth, half, unseen=traced.unseen(diffuse=False))
-    if grouped:
-        parts = 2 * len(traced.sorted_lights.groups)  # all direct light, and the part straight from emitters
+    # By group: all direct light, and the part straight from emitters.
+    direct = Direct.straight if grouped else None
+    stage = Stage((2 * half, 2 * half), 0.0, depth, half, by_group=grouped, direct=direct)
+    if parts := stage.parts(traced):
         of_parts = context.samples(KIND, _by_group(TRACED[side]), (1, *size, 3 * parts), (1, tile, tile, 3 * parts))
         writer = BothWriters(whole, of_parts)
-        sampling = replace(sampling, tally=traced.tally(diffuse=False, direct=Direct.straight), parts=parts)
-    scene = traced.whole(diffuse=False)
+    traced.whole(diffuse=False)
     sides, labels = traced.in_view(SIGNS[side])
     if writer.missing:
-        run_tiles(
-            writer, lambda region, seed: tile_samples(scene, sides, region, seed, sampling), seed=context.seed,
-            progress=context.progress, what="direct light" + (", far sides" if side else ""),
+        run_jobs(
+            writer, TileSampler(traced, stage), lambda region, seed: TexelJob.of(sides, region, seed), context.workers,
+            seed=context.seed, progress=context.progress, what="direct light" + (", far sides" if side else ""),
         )  # fmt: skip
     writer.finish()
     return labels

@@ -16,7 +16,7 @@ from lambent.baking.context import BakeContext
 from lambent.baking.methods import LightMapMethod, sorts_light
 from lambent.baking.quality import MAX_DEPTH, QualityName
 from lambent.baking.running.keys import group_inputs, key_of, light_inputs, material_inputs
-from lambent.baking.running.tiles import run_tiles
+from lambent.baking.running.tiles import run_jobs
 from lambent.baking.surfaces.backs import backs_of
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.scenes.panes import panes_of
@@ -27,7 +27,7 @@ from lambent.store.store import Writer
 
 if TYPE_CHECKING:
     from lambent.baking.light.groups import GroupMaps
-    from lambent.baking.light.sampling import Sampling
+    from lambent.baking.light.tiles import Stage
     from lambent.baking.photons.maps import PhotonMap
 
 KIND = "light_map"
@@ -189,19 +189,20 @@ def _bumpy_faces(context: BakeContext) -> Flags:
 
 def _sampled_maps(context: BakeContext) -> Maps:
     from lambent.baking.light.direct import direct_part
-    from lambent.baking.light.sampling import SMOOTH, finished, gathered, path_traced, plus, sampled_halves, variance_of
-    from lambent.baking.tracing.path_tracer import AllLight
+    from lambent.baking.light.sampling import SMOOTH, finished, plus, sampled_halves, variance_of
+    from lambent.baking.light.tiles import gathered, path_traced
+    from lambent.baking.tracing.group_tally import Direct
 
-    def maps(stage: str, sampling: Sampling) -> Maps:
+    def maps(name: str, stage: Stage) -> Maps:
         found = []
         for side in range(side_count(context)):
-            raw, labels = _samples(context, stage, side, sampling)
+            raw, labels = _samples(context, name, side, stage)
             context.progress(0, 1, "denoising")
             light, notes = finished(raw, context.traced.texels, labels, context.traced.cuts)
             lamps = lamp_light(context, side)
             found.append((plus(light, lamps.sum(axis=0)), notes))
-            if sampling.parts:
-                parts, (halves, known) = context.store.read(_parts(_of_side(stage, side)))[0], sampled_halves(raw)
+            if stage.direct is not None:
+                parts, (halves, known) = context.store.read(_parts(_of_side(name, side)))[0], sampled_halves(raw)
                 of_samples = parts, halves.mean(axis=0), variance_of(halves)
                 direct = direct_part(*of_samples, light, known, labels, SMOOTH)
                 direct = plus(direct[None], lamps.sum(axis=0))
@@ -213,38 +214,34 @@ def _sampled_maps(context: BakeContext) -> Maps:
     if not how.gather_samples:
         return first
     back = first[1][0] if len(first) > 1 else None
-    cache = context.traced.cache(first[0][0], back)
-    gathering = gathered(how.gather_samples, how.gather_noise, how.max_depth, cache)
-    return maps(GATHERED, replace(gathering, tally=AllLight(direct=True), parts=1))
+    stage = gathered(how.gather_samples, how.gather_noise, how.max_depth, (first[0][0], back))
+    return maps(GATHERED, replace(stage, direct=Direct.uncached))
 
 
 def _sorted_maps(context: BakeContext) -> Maps:
     """The light map of each side as the sum of the maps of light groups, which are stored as well."""
     from lambent.baking.light.groups import finished_groups, group_notes
-    from lambent.baking.light.sampling import gathered, path_traced
+    from lambent.baking.light.tiles import gathered, path_traced
     from lambent.baking.tracing.group_tally import Direct
 
     how: Settings = context.settings(KIND)
     traced, count = context.traced, len(context.traced.sorted_lights.groups)
 
-    def maps(stage: str, sampling: Sampling, *, diffuse: bool, direct: Direct | None) -> list[GroupMaps]:
-        parts = count * (1 + (direct is not None))
-        sampling = replace(sampling, tally=traced.tally(diffuse=diffuse, direct=direct), parts=parts)
-        found = []
+    def maps(name: str, stage: Stage, direct: Direct | None) -> list[GroupMaps]:
+        stage, found = replace(stage, by_group=True, direct=direct), []
         for side in range(side_count(context)):
-            raw, labels = _samples(context, stage, side, sampling)
-            by_group = context.store.read(_parts(_of_side(stage, side)))[0]
+            raw, labels = _samples(context, name, side, stage)
+            by_group = context.store.read(_parts(_of_side(name, side)))[0]
             one = finished_groups(raw, by_group, count, traced.texels, labels, traced.cuts, context.progress)
             found.append(one.plus(lamp_light(context, side)))
         return found
 
     last = how.gather_samples == 0
     direct = Direct.straight if last else None
-    found = maps(TRACED, path_traced(how.samples, how.noise, how.max_depth), diffuse=True, direct=direct)
+    found = maps(TRACED, path_traced(how.samples, how.noise, how.max_depth), direct)
     if not last:
-        cache = traced.grouped_cache(found[0].light, found[1].light if len(found) > 1 else None)
-        sampling = gathered(how.gather_samples, how.gather_noise, how.max_depth, cache)
-        found = maps(GATHERED, sampling, diffuse=False, direct=Direct.uncached)
+        lit = found[0].light, found[1].light if len(found) > 1 else None
+        found = maps(GATHERED, gathered(how.gather_samples, how.gather_noise, how.max_depth, lit), Direct.uncached)
     notes = context.provenance(groups=group_notes(traced, found[0].light))
     for side, one in zip(SIDES, found, strict=False):
         assert one.direct is not None, "the last stage has it"
@@ -254,41 +251,43 @@ def _sorted_maps(context: BakeContext) -> Maps:
 
 
 def _samples(
-    context: BakeContext, stage: str, side: int, how: Sampling, faces: Flags | None = None
+    context: BakeContext, stage_name: str, side: int, stage: Stage, faces: Flags | None = None
 ) -> tuple[Floats, Indices]:
     """Samples of one side (2, H, W, 4), on `faces` (T,) if given, and the charts that viewers see (H, W).
 
     The store also receives samples of parts, (1, H, W, 3 parts), averaged over both halves.
     """
     from lambent.baking.light.groups import BothWriters
-    from lambent.baking.light.sampling import tile_samples
+    from lambent.baking.light.sampling import TexelJob
+    from lambent.baking.light.tiles import TileSampler
 
-    tile, texels, name = context.settings(KIND).tile_texels, context.traced.texels, _of_side(stage, side)
+    tile, traced, name = context.settings(KIND).tile_texels, context.traced, _of_side(stage_name, side)
+    texels = traced.texels
     whole = context.samples(KIND, name, (2, texels.height, texels.width, 4), (2, tile, tile, 4))
     writer: Writer | BothWriters = whole
-    if how.parts:
-        channels = 3 * how.parts
+    if parts := stage.parts(traced):
+        channels = 3 * parts
         shape, chunk = (1, texels.height, texels.width, channels), (1, tile, tile, channels)
         writer = BothWriters(whole, context.samples(KIND, _parts(name), shape, chunk))
-    diffuse = how.cache is None
-    scene = context.traced.whole(diffuse=diffuse)
-    sides, labels = context.traced.in_view(SIGNS[side])
+    traced.whole(diffuse=stage.diffuse)
+    sides, labels = traced.in_view(SIGNS[side])
     if faces is not None:
         sides = replace(sides, valid=sides.valid & faces[texels.face])
     if writer.missing:
         lamps = lamp_light(context, side).sum(axis=0) if lamps_apart(context) else None
-        how = replace(how, unseen=context.traced.unseen(diffuse=diffuse), lamps=lamps)
         covered = np.zeros(texels.width * texels.height, bool)
         covered[texels.index[sides.valid.any(axis=1)]] = True
         of_map = covered.reshape(texels.height, texels.width)
-        run_tiles(
+        run_jobs(
             writer,
-            lambda region, seed: tile_samples(scene, sides, region, seed, how),
+            TileSampler(traced, stage),
+            lambda region, seed: TexelJob.of(sides, region, seed, lamps),
+            context.workers,
             seed=context.seed,
             progress=context.progress,
-            what=f"light map, {stage.removeprefix('light_map/')}" + (", far sides" if side else ""),
+            what=f"light map, {stage_name.removeprefix('light_map/')}" + (", far sides" if side else ""),
             cost=lambda region: 1 + float(of_map[region[1], region[2]].sum()),
-            wrote=_regions(context, stage, side, labels),
+            wrote=_regions(context, stage_name, side, labels),
         )
     writer.finish()
     return context.store.read(name), labels
@@ -344,9 +343,8 @@ def _dominant_direction(context: BakeContext) -> None:
     from lambent.baking.light.dominant_direction import dominant_direction, moments
 
     front, back = finished_maps(context)
-    cache = context.traced.cache(front, back)
-    how = moments(cache, context.settings(KIND).max_depth)
-    raw, _ = _samples(context, MOMENTS, 0, how, _bumpy_faces(context))
+    stage = moments((front, back), context.settings(KIND).max_depth)
+    raw, _ = _samples(context, MOMENTS, 0, stage, _bumpy_faces(context))
     sampled = np.maximum(front - lamp_light(context, 0).sum(axis=0, dtype=np.float32), 0)
     found = dominant_direction(raw, sampled, context.traced.labels)
     context.put(KIND, DOMINANT_DIRECTION, found, context.provenance())

@@ -85,27 +85,28 @@ def bake(context: BakeContext) -> None:
     missing = [name for name in _objects(context) if stale & {probe_name(name, part) for part in parts}]
     context.store.forget(probe_name(name, part) for name in owners for part in (*PARTS, GROUPS))
     context.watch.arrived(KIND, context.keys(KIND).keys() - stale)
-    from lambent.baking.probes.probe_set import ProbeSet
+    from lambent.baking.probes.probe_set import Lit, ProbeJob, ProbeSet
 
-    front, back = finished_maps(context)
-    front_or_none = front if cached(context) else None
+    sorts = sorts_light(context.methods)
+    lit = Lit(by_group=sorts)
+    if cached(context):
+        lit = Lit(*finished_maps(context), sorts, *(finished_groups(context) if sorts else ()))
     depth = context.settings("light_map").max_depth
-    probes = ProbeSet(context.traced, front_or_none, back, depth, backs_of(context.store), _held(context.store))
-    if sorts_light(context.methods):
-        probes.sort_light(*(finished_groups(context) if cached(context) else (None, None)))
+    probes = ProbeSet(context.traced, lit, depth, backs_of(context.store), _held(context.store))
     poor: list[tuple[float, str]] = []  # hidden share, and its words
-    for i, name in enumerate(missing):
-        context.progress(i, len(missing), f"probe of {name}")
-        seed = seed_of(context.seed, "probe", name)
-        result, meta = probes.bake(name, how.texels, how.samples, how.noise, seed, sharing(owners, name))
+    effort = how.texels, how.samples, how.noise
+    jobs = (ProbeJob(name, *effort, seed_of(context.seed, "probe", name), sharing(owners, name)) for name in missing)
+    context.progress(0, len(missing), "probes")
+    for done, (job, (result, meta)) in enumerate(context.workers.each(probes, jobs), 1):
+        name = job.name
         if meta["hidden_share"] > HIDDEN:
             poor.append((meta["hidden_share"], MISSED.format(name, 100 * meta["hidden_share"], meta["parallax_deg"])))
         for part in parts:
             context.put(KIND, probe_name(name, part), result[part], context.provenance(**meta))
         context.watch.arrived(KIND, [probe_name(name, part) for part in parts])
+        context.progress(done, len(missing), f"probe of {name}")
     if poor:
         log.warning(TOO_FEW, first_of([words for _, words in sorted(poor, reverse=True)]))
-    context.progress(1, 1, "probes")
 
 
 def _parts(context: BakeContext) -> tuple[str, ...]:

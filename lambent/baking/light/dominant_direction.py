@@ -15,17 +15,16 @@ from numpy.typing import NDArray
 
 from lambent.baking.light.denoise import fill
 from lambent.baking.light.noise import chart_means
-from lambent.baking.light.sampling import Sampling
-from lambent.baking.tracing import path_tracer
+from lambent.baking.light.tiles import Stage
 from lambent.core.arrays import Floats, Indices
 from lambent.core.light.colour import luminance
 
 SAMPLES = 64  # per texel, before averaging with neighbours
 
 
-def moments(cache: path_tracer.Cache, max_depth: int) -> Sampling:
-    """Sampling of first moments of incident light, like irradiance; surfaces show the finished light map."""
-    return Sampling((SAMPLES, SAMPLES), 0.0, max_depth, SAMPLES // 2, cache, path_tracer.moment)
+def moments(lit: tuple[Floats, Floats | None], max_depth: int) -> Stage:
+    """First moments of incident light, like irradiance; surfaces show the finished light map `lit` of both sides."""
+    return Stage((SAMPLES, SAMPLES), 0.0, max_depth, SAMPLES // 2, lit, of_moments=True)
 
 
 def dominant_direction(raw: Floats, irradiance: Floats, labels: Indices) -> NDArray[np.float16]:

@@ -27,7 +27,6 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.geometry.sequences import hammersley, r2
 from lambent.core.light.colour import HALF_MAX, luminance
 
-GATHER_PASS = 64  # samples of a texel that are stratified together
 SMOOTH = 8  # rounds of averaging before texels grow into gutters: about 4 texels wide
 
 
@@ -40,8 +39,7 @@ class Sampling:
 
     With a `cache` (`path_tracer.radiance`), paths end at diffuse surfaces, and the scene must have no diffuse terms.
     Direct light of the sun `unseen` is left out. A `tally` sums parts of the light, the last `parts` of which are
-    stored in addition to the whole; the cache must then suit the tally. Noise is relative to the light with that of
-    `lamps` (H, W, 3), which samples do not have.
+    stored in addition to the whole; the cache must then suit the tally.
     """
 
     samples: tuple[int, int]
@@ -53,48 +51,58 @@ class Sampling:
     unseen: Unseen | None = None
     tally: path_tracer.Tally | None = None
     parts: int = 0
-    lamps: Floats | None = None
 
 
-def path_traced(samples: tuple[int, int], noise: float, max_depth: int) -> Sampling:
-    """Sampling of all bounces, in the whole scene; `max_depth` as in `path_tracer.radiance`."""
-    return Sampling(samples, noise, max_depth, min(32, max(1, samples[0] // 2)))
+@dataclass(frozen=True, eq=False)
+class TexelJob:
+    """The n texels of a tile that are sampled, of those of its `size` (h, w).
+
+    place (n,) is row * w + column in the tile; points are the positions, normals and flat normals (n * POINTS, 3) of
+    their `path_tracer.Points`. Noise is relative to the light with that of lamps (n, 3), which samples do not have.
+    """
+
+    size: tuple[int, int]
+    place: Indices
+    points: tuple[Floats, ...]
+    lamps: Floats | None
+    seed: int
+
+    @classmethod
+    def of(cls, sides: Sides, region: tuple[slice, ...], seed: int, lamps: Floats | None = None) -> TexelJob:
+        """Those of a region of a map of samples (2, H, W, ...); `lamps` (H, W, 3)."""
+        rows, columns = region[1], region[2]
+        height, width = rows.stop - rows.start, columns.stop - columns.start
+        row, column = np.divmod(sides.texels.index, sides.texels.width)
+        inside = (row >= rows.start) & (row < rows.stop) & (column >= columns.start) & (column < columns.stop)
+        mine = np.flatnonzero(inside & sides.valid.any(axis=1))
+        place = (row[mine] - rows.start) * width + column[mine] - columns.start
+        of_lamps = None if lamps is None else lamps.reshape(-1, 3)[sides.texels.index[mine]]
+        return cls((height, width), place, chosen_points(sides, mine), of_lamps, seed)
 
 
-def gathered(samples: int, noise: float, max_depth: int, cache: Any) -> Sampling:
-    """One diffuse bounce onto cached light, through any mirrors in between (final gathering, Reichert 1992)."""
-    per_pass = max(1, min(GATHER_PASS, samples // 2))
-    return Sampling((2 * per_pass, samples), noise, max_depth, per_pass, cache)
-
-
-def tile_samples(scene: Any, sides: Sides, region: tuple[slice, ...], seed: int, how: Sampling) -> Floats:
-    """Raw content of one tile: (2, h, w, 4 + 3 parts) float32, the sums of both halves, of the whole and of each part.
+def tile_samples(scene: Any, job: TexelJob, how: Sampling) -> NDArray[np.float32]:
+    """Raw content of a tile: (2, h, w, 4 + 3 parts) float32, the sums of both halves, of the whole and of each part.
 
     The fourth channel has the sample counts.
     """
-    rows, columns = region[1], region[2]
-    height, width = rows.stop - rows.start, columns.stop - columns.start
-    row, column = np.divmod(sides.texels.index, sides.texels.width)
-    inside = (row >= rows.start) & (row < rows.stop) & (column >= columns.start) & (column < columns.stop)
-    mine = np.flatnonzero(inside & sides.valid.any(axis=1))
-    channels = 4 + 3 * how.parts
+    height, width = job.size
+    count, channels = len(job.place), 4 + 3 * how.parts
     raw = np.zeros((2, height * width, channels), np.float32)
-    if not len(mine):
+    if not count:
         return raw.reshape(2, height, width, channels)
-    points = points_of(sides, mine)
-    sums = np.zeros((2, len(mine), 3 + 3 * how.parts))
+    points = on_device(job.points)
+    sums = np.zeros((2, count, 3 + 3 * how.parts))
     fewest, most = how.samples
-    of_lamps = 0.0 if how.lamps is None else how.lamps.reshape(-1, 3)[sides.texels.index[mine]].astype(float)
+    of_lamps = 0.0 if job.lamps is None else job.lamps.astype(float)
     passes = 0
     while passes * how.per_pass < most:
-        sums += _sums_of_pass(scene, points, len(mine), (seed, passes), how)
+        sums += _sums_of_pass(scene, points, count, (job.seed, passes), how)
         passes += 2
         samples = passes * how.per_pass
         if samples >= fewest and relative_noise(sums[..., :3] * 2 / samples + of_lamps) <= how.noise:
             break
-    place = (row[mine] - rows.start) * width + column[mine] - columns.start
-    raw[:, place, :3], raw[:, place, 4:] = sums[..., :3], sums[..., 3:]
-    raw[:, place, 3] = passes * how.per_pass / 2
+    raw[:, job.place, :3], raw[:, job.place, 4:] = sums[..., :3], sums[..., 3:]
+    raw[:, job.place, 3] = passes * how.per_pass / 2
     return raw.reshape(2, height, width, channels)
 
 
@@ -114,17 +122,23 @@ def relative_noise(halves: Floats, share: Floats | None = None) -> float:
 
 
 def points_of(sides: Sides, mine: Indices) -> path_tracer.Points:
-    """POINTS of some texels on the device; invalid points are replaced by valid ones of the same texel."""
+    """`chosen_points` on the device."""
+    return on_device(chosen_points(sides, mine))
+
+
+def chosen_points(sides: Sides, mine: Indices) -> tuple[Floats, ...]:
+    """Positions, normals and flat normals (n * POINTS, 3) of texels; invalid points are replaced by valid ones."""
     valid = sides.valid[mine]
     ranked = np.argsort(~valid, axis=1, kind="stable")  # valid points first, used in turn
     turn = np.arange(POINTS) % valid.sum(axis=1)[:, None]
     choice = np.where(valid, np.arange(POINTS), np.take_along_axis(ranked, turn, axis=1))[..., None]
     t = sides.texels
     chosen = (np.take_along_axis(values[mine], choice, axis=1) for values in (t.positions, t.normals, t.flat))
-    position, normal, flat = (
-        vectors(mi.Vector3f, v * s) for v, s in zip(chosen, (1, sides.sign, sides.sign), strict=True)
-    )
-    return path_tracer.Points(position, normal, flat)
+    return tuple((v * s).reshape(-1, 3) for v, s in zip(chosen, (1, sides.sign, sides.sign), strict=True))
+
+
+def on_device(points: tuple[Floats, ...]) -> path_tracer.Points:
+    return path_tracer.Points(*(vectors(mi.Vector3f, v) for v in points))
 
 
 def _sums_of_pass(scene: Any, points: path_tracer.Points, count: int, seed: tuple[int, int], how: Sampling) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -37,8 +37,34 @@ LEAST_POINTS = 512  # least number of mirrored rays per object that shares a pro
 MOST_POINTS = 16384  # ...as long as the total does not exceed this
 
 
+@dataclass(frozen=True)
+class ProbeJob:
+    """The probe of an object, shared by the objects `sharing`; `texels`, `samples` and `noise` as of `bake_probe`."""
+
+    name: str
+    texels: int
+    samples: int
+    noise: float
+    seed: int
+    sharing: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Lit:
+    """What lights probes: the light map (H, W, 3), and that of backs; without it, paths are traced whole.
+
+    With `by_group`, probes are stored by light group too, from the groups' maps (n, H, W, 3).
+    """
+
+    irradiance: Floats | None = None
+    irradiance_back: Floats | None = None
+    by_group: bool = False
+    groups: Floats | None = None
+    groups_back: Floats | None = None
+
+
 class ProbeSet:
-    """Bakes the probes of a scene from its light map (H, W, 3), or, if that is None, by whole path traced paths.
+    """Bakes the probes of a scene: in this process or, pickled, in another.
 
     With the light map, a path ends at the first diffuse surface; mirrors in mirrors are traced either way. Without it,
     paths have at most `max_depth` vertices. `backs` are the opaque objects that are seen from behind too, and `held`
@@ -46,23 +72,24 @@ class ProbeSet:
     """
 
     def __init__(
-        self, traced: TracedScene, irradiance: Floats | None, irradiance_back: Floats | None, max_depth: int,
-        backs: frozenset[str] = frozenset(), held: frozenset[str] = frozenset(),
+        self, traced: TracedScene, lit: Lit, max_depth: int, backs: frozenset[str] = frozenset(),
+        held: frozenset[str] = frozenset(),
     ) -> None:  # fmt: skip
-        whole_paths = irradiance is None
+        self._made_of = traced, lit, max_depth, backs, held
+        whole_paths = lit.irradiance is None
         self._traced, self._depth = traced, max_depth if whole_paths else MIRROR_DEPTH
         self._builder, self._whole = traced.builder(diffuse=whole_paths), traced.whole(diffuse=whole_paths)
         self._scene, self._backs, self._held = self._builder.scene, backs, held
         self._left_out: tuple[frozenset[str], Any] | None = None
         self._seen = self._builder.without(traced.apart, self._whole)
-        self._cache = None if irradiance is None else traced.cache(irradiance, irradiance_back)
+        self._cache = None if lit.irradiance is None else traced.cache(lit.irradiance, lit.irradiance_back)
         self._sorting: tuple[Tally, GroupedCache | None] | None = None
+        if lit.by_group:
+            cache = None if lit.groups is None else traced.grouped_cache(lit.groups, lit.groups_back)
+            self._sorting = traced.tally(diffuse=whole_paths, direct=None), cache
 
-    def sort_light(self, groups: Floats | None, groups_back: Floats | None) -> None:
-        """Store probes by light group too, from the groups' light maps (n, H, W, 3), unless whole paths are traced."""
-        whole_paths = self._cache is None
-        cache = None if groups is None else self._traced.grouped_cache(groups, groups_back)
-        self._sorting = self._traced.tally(diffuse=whole_paths, direct=None), cache
+    def __reduce__(self) -> tuple[Any, ...]:
+        return ProbeSet, self._made_of
 
     @cached_property
     def _solids(self) -> SolidTest:
@@ -138,10 +165,8 @@ class ProbeSet:
     def _transmits(self, name: str) -> bool:
         return self._scene.materials[self._scene.object(name).material].transmits
 
-    def bake(
-        self, name: str, texels: int, samples: int, noise: float, seed: int, sharing: tuple[str, ...] = ()
-    ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-        """Arrays radiance, distance and planes of one object's probe, shared by the objects `sharing`, and its meta.
+    def __call__(self, job: ProbeJob) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Arrays radiance, distance and planes of one object's probe, and its meta.
 
         The meta has the centre, whether the object was left out, and how well one centre represents the whole surface:
         `hidden_share` and `parallax_deg` (`hidden`), `mirror_error`, `seen_irradiance`, `occlusion_gain` and
@@ -149,7 +174,7 @@ class ProbeSet:
 
         Planes given by the scene are used as they are; otherwise they are found from the probe itself.
         """
-        names = (name, *sharing)
+        name, names, seed = job.name, (job.name, *job.sharing), job.seed
         without = self._without(self._own(tuple(one for one in names if one not in self._held)))
         rays = self._mirrored(names, seed)
         centre = self._centre(name, without, rays, seed)
@@ -162,7 +187,7 @@ class ProbeSet:
         if self._sorting is not None:
             tally, cache = self._sorting
             around = replace(around, cache=cache, tally=tally)
-        probe = bake_probe(around, centre, texels, samples, seed, noise)
+        probe = bake_probe(around, centre, job.texels, job.samples, seed, job.noise)
         given = self._scene.probe_planes.get(name)
         if given is None:
             planes = bounding_planes(probe.distance, probe.normals)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.baking.light.sampling import Sampling, tile_samples
+from lambent.baking.light.sampling import Sampling, TexelJob, tile_samples
 from lambent.baking.surfaces.texels import Sides, Texels
 from lambent.baking.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats, Indices
@@ -37,7 +37,7 @@ def retraced(
         mine = chosen[first : first + AT_ONCE]
         line = _in_a_line(sides, mine)
         region = tuple(slice(0, size) for size in (2, 1, len(mine), 4))
-        parts.append(tile_samples(scene, line, region, seed + first, how)[:, 0])
+        parts.append(tile_samples(scene, TexelJob.of(line, region, seed + first), how)[:, 0])
     raw = np.concatenate(parts, axis=1)
     return np.asarray(raw[..., :3] / np.maximum(raw[..., 3:], 1), float)
 

@@ -44,7 +44,7 @@ def opened(on: int | str) -> Iterator[DaskWorkers]:
     Raises
     ------
     UserError
-        If Dask is missing, nothing answers at the address, or no worker appears.
+        If Dask is missing, nothing answers at the address, no worker appears, or versions differ.
     """
     try:
         import distributed
@@ -66,12 +66,17 @@ def opened(on: int | str) -> Iterator[DaskWorkers]:
         try:
             asyncio.run(_connect(address))
             client = stack.enter_context(distributed.Client(address, timeout=SECONDS))
-            client.wait_for_workers(1, timeout=SECONDS)
-            # By default results pass through the scheduler, whose network would limit a large cluster.
-            client.direct_to_workers = _reaches(client)
         except (OSError, TimeoutError, ValueError) as error:
-            hint = "start a scheduler with `dask scheduler` and workers with `dask worker ADDRESS --nthreads 1`"
-            raise UserError("no worker answered", field="--on", got=address, hint=hint) from error
+            expected, hint = "a number of processes, or tcp://HOST:PORT", "start a scheduler with `dask scheduler`"
+            raise UserError("no scheduler answered", field="--on", got=address, expected=expected, hint=hint) from error
+        try:
+            client.wait_for_workers(1, timeout=SECONDS)
+        except TimeoutError as error:
+            hint = f"start some with `dask worker {address} --nthreads 1`"
+            raise UserError("the scheduler has no workers", field="--on", got=address, hint=hint) from error
+        _check_versions(client)
+        # By default results pass through the scheduler, whose network would limit a large cluster.
+        client.direct_to_workers = _reaches(client)
         yield DaskWorkers(client, threads)
 
 
@@ -92,6 +97,19 @@ def _deaf() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def _check_versions(client: Any) -> None:
+    """Raise `UserError` for other libraries there: a process that lacks Lambent ends at its first task."""
+    found = client.get_versions(packages=[*LIBRARIES])
+    there = [("the scheduler", found["scheduler"], LIBRARIES[:1])]
+    there += [("a worker", one, LIBRARIES) for one in found["workers"].values()]
+    for who, one, names in there:
+        for name in names:
+            if (got := one["packages"].get(name)) != (mine := version(name)):
+                hint = "install the same versions on every machine"
+                what = f"{who} has a different {name}" if got else f"{who} lacks {name}"
+                raise UserError(what, field="--on", got=got, expected=mine, hint=hint)
 
 
 async def _connect(address: str) -> None:
@@ -164,6 +182,11 @@ def _result(future: Any) -> Any:
 
     try:
         return future.result()
+    except UserError as error:
+        if error.file is None:
+            raise
+        hint = "pictures of environments and measured tables need the same path on every machine"
+        raise UserError(f"on a worker: {error.message}", file=error.file, hint=hint) from error
     except KilledWorker as error:
         hint = "see their logs; where memory is short, use fewer workers"
         raise UserError("several workers died while tracing the same tile", field="--on", hint=hint) from error

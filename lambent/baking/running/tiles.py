@@ -7,14 +7,17 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.baking.running.workers import InProcess, Workers
 from lambent.core.progress import Progress
 from lambent.store.store import Artefact, Chunk
 
+J = TypeVar("J")
 Tile = Callable[[tuple[slice, ...], int], NDArray[Any]]  # (region of the array, seed) -> its content
 
 
@@ -39,9 +42,16 @@ class TileWriter(Protocol):
     def write(self, chunk: Chunk, data: NDArray[Any]) -> None: ...
 
 
-def run_tiles(
+def run_tiles(writer: TileWriter, tile: Tile, *, seed: int, progress: Progress, what: str) -> None:
+    """Compute the missing chunks of an array in this process, in order; `tile` is the content of a region."""
+    run_jobs(writer, lambda job: tile(*job), lambda *job: job, InProcess(), seed=seed, progress=progress, what=what)
+
+
+def run_jobs(
     writer: TileWriter,
-    tile: Tile,
+    work: Callable[[J], NDArray[Any]],
+    job: Callable[[tuple[slice, ...], int], J],
+    workers: Workers,
     *,
     seed: int,
     progress: Progress,
@@ -49,24 +59,40 @@ def run_tiles(
     cost: Callable[[tuple[slice, ...]], float] = lambda region: 1.0,
     wrote: Callable[[], None] = lambda: None,
 ) -> None:
-    """Compute the missing chunks of an array and write each as soon as it is done.
+    """Compute the missing chunks of an array and write each as soon as it is done, the most expensive first.
 
     Parameters
     ----------
-    tile : callable
-        Content of a region, from the region and the tile's seed.
+    work : callable
+        Content of a region, from its job.
+    job : callable
+        From the region and the tile's seed.
+    workers : Workers
+        Run the jobs; work and jobs must be picklable for others than this process.
     cost : callable
-        Expected work of a region in any unit, so that progress moves evenly.
+        Expected work of a region in any unit, so that progress moves evenly, and no worker waits for a large tile.
     wrote : callable
         Called after each chunk.
     """
     name, region = writer.artefact.name, writer.artefact.region
     costs: dict[Chunk, float] = {chunk: cost(region(chunk)) for chunk in writer.artefact.chunk_grid}
     total = sum(costs.values())
-    done = total - sum(costs[chunk] for chunk in writer.missing)
+    missing = sorted(writer.missing, key=lambda chunk: -costs[chunk])
+    done = total - sum(costs[chunk] for chunk in missing)
     progress(done, total, what)
-    for chunk in writer.missing:
-        writer.write(chunk, np.asarray(tile(region(chunk), seed_of(seed, name, chunk))))
+    pieces = ((chunk, job(region(chunk), seed_of(seed, name, chunk))) for chunk in missing)
+    for (chunk, _), found in workers.each(_OfPiece(work), pieces):
+        writer.write(chunk, np.asarray(found))
         done += costs[chunk]
         progress(done, total, what)
         wrote()
+
+
+@dataclass(frozen=True)
+class _OfPiece(Generic[J]):
+    """Work on jobs that have their chunks with them."""
+
+    work: Callable[[J], NDArray[Any]]
+
+    def __call__(self, piece: tuple[Chunk, J]) -> NDArray[Any]:
+        return self.work(piece[1])

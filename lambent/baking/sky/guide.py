@@ -79,20 +79,31 @@ def groups_of(scene: Scene, size_m: float = CELL_M) -> Groups:
         size_m *= 1.1
 
 
-class SkyGuide:
+@dataclass(frozen=True, eq=False)
+class Learnt:
     """A table of bins for each group that needs one; table 0 serves all other groups.
 
     table (groups,) int: number of a group's table; shares (tables, BINS): of each table's samples; brought (groups,):
     approximate irradiance, W/m^2 of luminance.
     """
 
-    def __init__(self, bins: SkyBins, groups: Groups, table: Indices, shares: Floats, brought: Floats) -> None:
-        self.bins, self.groups, self.shares, self.brought = bins, groups, shares, brought
-        self._table = mi.UInt32(table.astype(np.uint32))
-        cumulative = np.cumsum(shares, axis=1)
+    groups: Groups
+    table: Indices
+    shares: Floats
+    brought: Floats
+
+
+class SkyGuide:
+    """The tables on the device, for the bins of their sky."""
+
+    def __init__(self, bins: SkyBins, learnt: Learnt) -> None:
+        self.bins, self.learnt, self.groups, self.brought = bins, learnt, learnt.groups, learnt.brought
+        self.shares = learnt.shares
+        self._table = mi.UInt32(learnt.table.astype(np.uint32))
+        cumulative = np.cumsum(self.shares, axis=1)
         cumulative[:, -1] = 2  # rounding must not lead past the end
         self._cumulative = mi.Float(cumulative.astype(np.float32).ravel())
-        self._share = mi.Float(shares.astype(np.float32).ravel())
+        self._share = mi.Float(self.shares.astype(np.float32).ravel())
 
     def table_at(self, position: Any, normal: Any, active: Any = True) -> Any:
         """Number of the table (mi.UInt32) at points of surfaces."""
@@ -150,7 +161,7 @@ def learn(
     brought = np.zeros(groups.count)
     brought[pre_pass.group] = first[0] @ bins.luminance * BIN_SR
     brought[pre_pass.group[wanted]] = more[0] @ bins.luminance * BIN_SR
-    return SkyGuide(bins, groups, table, np.concatenate([plain[None], shares]), brought)
+    return SkyGuide(bins, Learnt(groups, table, np.concatenate([plain[None], shares]), brought))
 
 
 class _PrePass:
@@ -250,7 +261,7 @@ def _emitter_class() -> Any:
     class GuidedSky(mi.Emitter):  # type: ignore[misc]
         def __init__(self, props: Any, guide: SkyGuide, bounds: Any) -> None:
             mi.Emitter.__init__(self, props)
-            self.sky, self.guide = props["sky"], guide
+            self.sky, self.guide, self.bounds = props["sky"], guide, bounds
             self.m_flags = self.sky.flags()
             sphere = bounds.bounding_sphere()
             self._centre, self._radius = mi.Point3f(sphere.center), mi.Float(sphere.radius)

@@ -17,6 +17,7 @@ from lambent.baking.sky.guide import guided_sky, learn
 from lambent.baking.sky.sun import FoundSun, SunPicture, is_sun
 from lambent.baking.tracing.lights.emitters import brought_by, number_of
 from lambent.baking.tracing.scene_builder import SceneBuilder, environment_dict
+from lambent.scenes.scene import Environment
 
 
 class FirstLight:
@@ -70,11 +71,7 @@ def sky_without(found: FoundSun, builder: SceneBuilder, whole: Any, effort: floa
     same = found.picture is None and not found.record.panes
     if environment is None or builder.scene.environment is None or same:
         return environment
-    description = environment_dict(builder.scene.environment)
-    picture = np.array(description["bitmap"])
-    if found.picture is not None:
-        _take_out(picture[..., :3], found.picture, float(description["scale"]))
-    sky = mi.load_dict(description | {"bitmap": mi.Bitmap(picture)})
+    sky = bare_sky(found, builder.scene.environment)
     guide = learn(builder.scene, whole, sky, panes=bool(found.record.panes), effort=effort)
     if guide is not None:
         sky = guided_sky(sky, guide, whole.bbox())
@@ -83,6 +80,15 @@ def sky_without(found: FoundSun, builder: SceneBuilder, whole: Any, effort: floa
     parameters["sampling_weight"] = float(own["sampling_weight"]) * max(rest / former if former > 0 else 1.0, 0.1)
     parameters.update()
     return sky
+
+
+def bare_sky(found: FoundSun, environment: Environment) -> Any:
+    """mi.Emitter of an environment without its sun, not guided."""
+    description = environment_dict(environment)
+    picture = np.array(description["bitmap"])
+    if found.picture is not None:
+        _take_out(picture[..., :3], found.picture, float(description["scale"]))
+    return mi.load_dict(description | {"bitmap": mi.Bitmap(picture)})
 
 
 def _take_out(picture: Any, sun: SunPicture, scale: float) -> None:

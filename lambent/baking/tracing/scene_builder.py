@@ -106,7 +106,7 @@ class SceneBuilder:
         ]
         self._unsized = [emitter for number, emitter in enumerate(self.lights) if number not in sized]
         if sampling is None:
-            self.environment: Any = _emitter_of(scene.environment, COARSE if coarse_sky else 1)
+            self.environment: Any = emitter_of_environment(scene.environment, COARSE if coarse_sky else 1)
         else:
             self.environment = sampling.environment
             self.weigh_emitters(sampling.weights)
@@ -231,7 +231,7 @@ def light_dict(light: PointLight | DirectionalLight) -> dict[str, Any]:
     return {"type": "spot", "to_world": frame, "intensity": _rgb(light.intensity), **angles}
 
 
-def _emitter_of(environment: Environment | None, size: int = 1) -> Any:
+def emitter_of_environment(environment: Environment | None, size: int = 1) -> Any:
     """mi.Emitter, its picture reduced by `size` x `size`.
 
     None if it emits no light: Mitsuba's densities of a black picture are not finite.

@@ -5,27 +5,29 @@ Everything follows from the scene and the split meshes alone: a resumed bake fin
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from lambent.baking.light.cache import GroupedCache, LightMapCache
 from lambent.baking.light.lamps import LampLight, LampPoints, drawn_of
 from lambent.baking.light.stitching import Cuts, cuts_of
+from lambent.baking.sky.sent import SentSky
 from lambent.baking.sky.sun import FoundSun, is_sun, sun_of
 from lambent.baking.surfaces.atlas import Atlas
 from lambent.baking.surfaces.backs import crossed_by_light
 from lambent.baking.surfaces.texels import POINTS, Sides, Texels, chart_labels, texels_of
-from lambent.baking.tracing.first_light import FirstLight, sky_without
+from lambent.baking.tracing.first_light import FirstLight, bare_sky, sky_without
 from lambent.baking.tracing.group_tally import Direct, GroupTally, MixTally, Sorting
 from lambent.baking.tracing.lights.emitters import balance_emitters
 from lambent.baking.tracing.lights.lamps import LampRays
 from lambent.baking.tracing.lights.sun import NoSun, Sun, SunRays, Unseen
-from lambent.baking.tracing.scene_builder import EmitterSampling, SceneBuilder
+from lambent.baking.tracing.scene_builder import EmitterSampling, SceneBuilder, emitter_of_environment
 from lambent.baking.tracing.seen.visibility import seen, viewing_places, without_hidden
 from lambent.baking.tracing.solids import SolidTest
 from lambent.core.arrays import Flags, Floats, Indices
@@ -39,6 +41,8 @@ from lambent.scenes.light_groups import SortedLights, sorted_lights
 from lambent.scenes.panes import panes_of
 from lambent.scenes.scene import Scene
 
+FOUND = ("_found_sun", "places", "drawn_lamps", "_drawn_light")  # found by tracing, or by reading pictures
+
 
 class TracedScene:
     """Shared by the artefacts of a bake. `merged` is the concatenated geometry of the atlas, as from `atlas.merged`.
@@ -47,6 +51,8 @@ class TracedScene:
     light map leaves out the scene's sun unless `sun_left_out` is false. If `lamps_apart`, its samples leave out lamps,
     whose light is `lamp_light`. Objects in `unmapped` have no texels in it. The sky is guided with `effort`
     (`sky.guide.learn`).
+
+    Pickled, it has no texels, but all else that takes tracing to find. A process keeps the last one it unpickled.
     """
 
     def __init__(
@@ -66,6 +72,30 @@ class TracedScene:
         self._sides: dict[float, Sides] = {}
         self._views: dict[float, tuple[Sides, Indices]] = {}
         self._lamp_light: dict[float, LampLight] = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        made = partial(
+            TracedScene, self.atlas, {}, self.two_sided, sun_left_out=self._sun_left_out,
+            lamps_apart=self._lamps_apart, unmapped=self._unmapped, effort=self._effort,
+        )  # fmt: skip
+        self.unseen(diffuse=self._at_hand["diffuse"])
+        assert self._sampling is not None, "a builder found it"
+        sky, (without,) = self._sampling.environment, self._sky_without or (None,)
+        skies = [None if one is None else SentSky.of(one) for one in (sky, without)]
+        found = {name: getattr(self, name) for name in FOUND}
+        state = made, found, self._sampling.weights, skies, without is sky
+        return _unpickled, (pickle.dumps(state),)
+
+    def _take(self, found: dict[str, Any], weights: Floats, skies: list[SentSky | None], is_same: bool) -> None:
+        """Take over what another process found."""
+        self.__dict__ |= found
+        environment, sun = self.scene.environment, self._found_sun
+        sky = None if skies[0] is None else skies[0].like(emitter_of_environment(environment))
+        self._sampling = EmitterSampling(sky, weights)
+        if is_same:
+            self._sky_without = (sky,)
+        elif skies[1] is not None and sun is not None and environment is not None:
+            self._sky_without = (skies[1].like(bare_sky(sun, environment)),)
 
     def builder(self, *, diffuse: bool, photons: bool = False) -> SceneBuilder:
         """Builder of the scene, with or without diffuse terms; kept until the other one is needed.
@@ -183,8 +213,9 @@ class TracedScene:
         """
         builder = self.builder(diffuse=False)
         sun = None if self.sun is None else SunRays(self.sun, self.whole(diffuse=False), factor_of_sun)
-        return LightMapCache(builder, irradiance, irradiance_back, sun, self._drawn_light(), lamps)
+        return LightMapCache(builder, irradiance, irradiance_back, sun, self._drawn_light, lamps)
 
+    @cached_property
     def _drawn_light(self) -> list[Floats]:
         """By side with a light map, the direct light (H, W, 3) of lamps that renderers draw; empty without lamps."""
         signs = (1.0, -1.0) if self.lamps and any(self.two_sided) else (1.0,) if self.lamps else ()
@@ -291,6 +322,15 @@ class TracedScene:
         if once.any():  # a scene may have nothing on this side; Dr.Jit has no empty arrays
             found[once] = test(t.positions[once], sign * t.flat[once])
         return np.asarray(np.take_along_axis(found, first, axis=1) & asked)
+
+
+@lru_cache(maxsize=1)
+def _unpickled(state: bytes) -> TracedScene:
+    """The same for all work on one scene, so that its kernels and trees are made once."""
+    made, *found = pickle.loads(state)
+    traced = made()
+    traced._take(*found)
+    return cast(TracedScene, traced)
 
 
 @lru_cache(maxsize=8)

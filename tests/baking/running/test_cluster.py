@@ -8,7 +8,8 @@ import pickle
 import signal
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +23,12 @@ from lambent.baking.running.cluster import DaskWorkers, opened
 from lambent.baking.running.workers import Workers
 from lambent.baking.transport.view import View
 from lambent.core.errors import UserError
+from lambent.core.pictures.images import read_image
 from lambent.core.progress import Progress, silent
 from lambent.materials.document import Lobe, Material
 from lambent.store.store import Store
 from tests.baking.interreflection.test_interreflection import FIRST, FROM_ABOVE, corner
+from tests.baking.running.lit_room import bake_lit, lit_room
 
 BOUNCES = Bounces((16, 1, 1), samples=64, fixed=frozenset({"side"}))
 VIEW = View(FROM_ABOVE, 16, 16)
@@ -64,8 +67,8 @@ def pids(workers: DaskWorkers) -> set[int]:
     return set(workers.client.run(os.getpid).values())
 
 
-def kill_one(workers: DaskWorkers) -> None:
-    os.kill(min(pids(workers)), signal.SIGKILL)
+def kill_one_of(found: set[int]) -> None:
+    os.kill(min(found), signal.SIGKILL)
 
 
 class Elsewhere:
@@ -80,6 +83,13 @@ class Elsewhere:
 
 def test_tiles_depend_on_their_jobs_alone(alone: Store, tmp_path: Path) -> None:
     assert_same(baked(tmp_path / "s", Elsewhere()), alone)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("options", [{}, {"light_groups": "scene"}, {"probes": "traced"}], ids=str)
+def test_light_maps_and_probes_depend_on_their_jobs_alone(tmp_path: Path, options: dict[str, Any]) -> None:
+    scene = lit_room(tmp_path)
+    assert_same(bake_lit(scene, tmp_path / "s", Elsewhere(), **options), bake_lit(scene, tmp_path / "alone", **options))
 
 
 def test_jobs_of_other_processes_go_through_several_passes() -> None:
@@ -123,7 +133,7 @@ def test_a_worker_that_is_killed_is_survived(alone: Store, two: DaskWorkers, tmp
 
     def progress(done: float, total: float, what: str) -> None:
         if next(calls) in (3, 9):
-            kill_one(two)
+            kill_one_of(pids(two))
 
     assert_same(baked(tmp_path / "s", two, progress), alone)
 
@@ -176,17 +186,24 @@ def test_a_cluster_of_slow_and_dying_workers(tmp_path: Path, monkeypatch: pytest
     with opened(8) as workers:
         workers.client.wait_for_workers(8)
         workers.client.register_plugin(slow)
-        before, calls, kills = pids(workers), itertools.count(), (5, 32)
 
-        def progress(done: float, total: float, what: str) -> None:
-            if next(calls) in kills:
-                kill_one(workers)
+        def dying(kills: tuple[int, int], work: Callable[..., Store], folder: Path) -> Store:
+            before, calls = pids(workers), itertools.count()
 
-        found = baked(tmp_path / "s", workers, progress)
-        assert next(calls) > max(kills), "both were killed during the bake"
-        workers.client.wait_for_workers(8)
-        assert len(before - pids(workers)) == 2
-    assert_same(found, baked(tmp_path / "alone"))
+            def progress(done: float, total: float, what: str) -> None:
+                if next(calls) in kills:
+                    kill_one_of(before & pids(workers))  # new ones may have smaller numbers
+
+            found = work(folder, workers, progress)
+            assert next(calls) > max(kills), "both were killed during the bake"
+            workers.client.wait_for_workers(8)
+            assert len(before - pids(workers)) == 2
+            return found
+
+        tiles = dying((5, 32), baked, tmp_path / "tiles")
+        light = dying((20, 68), partial(bake_lit, lit_room(tmp_path)), tmp_path / "light")  # traced, gathered
+    assert_same(tiles, baked(tmp_path / "alone"))
+    assert_same(light, bake_lit(lit_room(tmp_path), tmp_path / "light alone"))
 
 
 @pytest.mark.long
@@ -208,14 +225,41 @@ def test_a_worker_with_other_libraries_is_refused(two: DaskWorkers, monkeypatch:
         list(two.each(abs, [1]))
 
 
+@pytest.mark.parametrize("name", ["lambent", "mitsuba"])
+def test_a_cluster_with_other_libraries_is_refused(
+    two: DaskWorkers, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    from lambent.baking.running import cluster
+
+    ours = cluster.version
+    monkeypatch.setattr(cluster, "version", lambda one: "2.0" if one == name else ours(one))
+    with pytest.raises(UserError, match=rf"--on: .* has a different {name}; found {ours(name)}; expected 2\.0"):
+        opened(two.client.scheduler.address).__enter__()
+
+
+def test_a_file_that_a_worker_lacks_is_named(two: DaskWorkers) -> None:
+    with pytest.raises(UserError, match=r"sky\.exr: on a worker: cannot be read.*same path on every machine"):
+        list(two.each(read_image, [Path("absent") / "sky.exr"]))
+
+
 def test_workers_that_there_are_none_of(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed", reason="Dask is not installed")
     with pytest.raises(UserError, match="--on: no workers; found 0; expected at least 1"), opened(0):
         pass
     monkeypatch.setattr("lambent.baking.running.cluster.SECONDS", 1.0)
     for nowhere in ("tcp://127.0.0.1:1", "nonsense", "smoke://a:1"):
-        with pytest.raises(UserError, match="no worker answered"), opened(nowhere):
-            pass
+        with pytest.raises(UserError, match=f"--on: no scheduler answered; found {nowhere}; expected a number"):
+            opened(nowhere).__enter__()
+
+
+def test_a_scheduler_without_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed")
+    monkeypatch.setattr("lambent.baking.running.cluster.SECONDS", 1.0)
+    with (
+        distributed.LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address="127.0.0.1:0") as empty,
+        pytest.raises(UserError, match=r"the scheduler has no workers; found tcp:.*; start some with `dask worker tcp"),
+    ):
+        opened(empty.scheduler_address).__enter__()
 
 
 def test_without_dask(monkeypatch: pytest.MonkeyPatch) -> None:
