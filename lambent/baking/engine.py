@@ -28,6 +28,8 @@ from lambent.core.files import write_text
 
 T = TypeVar("T")
 LLVM_OLDEST = 19  # Dr.Jit refuses 14 and aborts with 15 to 18
+# Dr.Jit's threads flush denormal numbers to zero. A single one is the caller's, which keeps them: other bits.
+LEAST_THREADS = 2
 LIBRARY_VARIABLE = "DRJIT_LIBLLVM_PATH"
 VARIANT_VARIABLE = "LAMBENT_VARIANT"
 VARIANTS = ("cuda_ad_rgb", "llvm_ad_rgb")
@@ -101,7 +103,16 @@ def engine() -> Engine:
     # To find loop invariants, Dr.Jit traces a loop twice, and a nested one four times; our kernels gain nothing from
     # it.
     dr.set_flag(dr.JitFlag.OptimizeLoops, False)
+    set_threads(dr.thread_count())
     return chosen
+
+
+def set_threads(count: int) -> None:
+    """Set the number of Dr.Jit's threads, LEAST_THREADS or more."""
+    import drjit as dr
+
+    if dr.thread_count() != max(count, LEAST_THREADS):
+        dr.set_thread_count(max(count, LEAST_THREADS))
 
 
 def once_per_variant(make: Callable[[], T]) -> Callable[[], T]:

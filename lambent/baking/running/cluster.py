@@ -24,7 +24,7 @@ from importlib.metadata import version
 from itertools import islice
 from typing import Any, TypeVar
 
-from lambent.baking.engine import engine
+from lambent.baking.engine import engine, set_threads
 from lambent.core.errors import UserError
 
 J = TypeVar("J")
@@ -56,7 +56,7 @@ def opened(on: int | str) -> Iterator[DaskWorkers]:
         threads, address = None, str(on)
         if isinstance(on, int):
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="lambent-"))
-            threads = max(1, engine().threads // on)
+            threads = engine().threads // on
             with _deaf():
                 local = distributed.LocalCluster(
                     n_workers=on, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0",
@@ -102,7 +102,7 @@ def _deaf() -> Iterator[None]:
 def _check_versions(client: Any) -> None:
     """Raise `UserError` for other libraries there: a process that lacks Lambent ends at its first task."""
     found = client.get_versions(packages=[*LIBRARIES])
-    there = [("the scheduler", found["scheduler"], LIBRARIES[:1])]
+    there: list[tuple[str, Any, tuple[str, ...]]] = [("the scheduler", found["scheduler"], LIBRARIES[:1])]
     there += [("a worker", one, LIBRARIES) for one in found["workers"].values()]
     for who, one, names in there:
         for name in names:
@@ -205,17 +205,10 @@ def _do(work: bytes, job: bytes, makers: dict[str, str], threads: int | None) ->
             if mine[name] != wanted:
                 raise UserError(f"a worker has a different {name}", field="--on", got=mine[name], expected=wanted)
         if threads is not None:
-            _limit(threads)
+            set_threads(threads)
         return _loaded(work)(pickle.loads(job))
 
 
 @lru_cache(maxsize=1)
 def _loaded(work: bytes) -> Any:
     return pickle.loads(work)
-
-
-def _limit(threads: int) -> None:
-    import drjit as dr
-
-    if dr.thread_count() != threads:
-        dr.set_thread_count(threads)

@@ -148,6 +148,21 @@ def test_a_bake_that_is_interrupted_leaves_workers_that_go_on(alone: Store, two:
     assert_same(baked(tmp_path / "s", two), alone)
 
 
+def product_of_denormals(size: int) -> np.ndarray:
+    from lambent.baking.engine import engine
+
+    engine()
+    import drjit as dr
+    import mitsuba as mi
+
+    return np.array(dr.opaque(mi.Float, 1e-38, size) * dr.opaque(mi.Float, 0.1))
+
+
+def test_workers_of_few_threads_round_like_this_process(two: DaskWorkers) -> None:
+    for size, found in two.each(product_of_denormals, [8, 1 << 16]):
+        assert np.array_equal(found, product_of_denormals(size)), size
+
+
 def test_a_cluster_that_runs_already(two: DaskWorkers) -> None:
     with opened(two.client.scheduler.address) as workers:
         assert dict(workers.each(abs, [-1, 2, -3])) == {-1: 1, 2: 2, -3: 3}
