@@ -49,6 +49,15 @@ def test_its_light_is_finite_and_not_black(name: str, mi: Any, tmp_path: Path) -
     assert any(side.any() for side in sides)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "rare"), [("keyhole", True), ("kitchen_in_metres", False)])
+def test_light_that_paths_rarely_find_is_said(name: str, rare: bool, mi: Any, tmp_path: Path, caplog: Any) -> None:
+    from lambent.baking.bake import bake
+
+    bake(load_scene(UNSEEN[name](tmp_path)), tmp_path / "store", quality=TINY, only=["light_map"]).close()
+    assert ("too rare to be found" in caplog.text) == rare
+
+
 def test_a_row_names_what_it_misses() -> None:
     row = {"outcome": "baked", "flip": 0.1, "noise": 0.05, "worst_tile": 0.2, "warnings": ["a", "b"]}
     assert misses(row) == ["flip"]
