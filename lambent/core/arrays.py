@@ -1,6 +1,8 @@
-"""Array types, hashes of points, and sums, ranges and components of things with numbers."""
+"""Array types, numbers of a text, hashes of points, and sums, ranges and components of things with numbers."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,20 @@ Flags = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 Image = NDArray[np.float32]  # linear Rec.709, (H, W, 3)
 MIXERS = np.array([0x1E3779B97F4A7C15, 0x42B2AE3D27D4EB4F, 0x165667B19E3779F9])  # odd, without a pattern
+
+
+def numbers_in(text: bytes, kind: type = float) -> NDArray[Any] | None:
+    """The numbers (n,) of a text, between blanks and line ends; None if a word is not one.
+
+    `np.fromstring` alone takes "- 1" for one number, and "1.2.3" for two.
+    """
+    blank = np.frombuffer(text, np.uint8) <= ord(" ")
+    count = int(np.count_nonzero(blank[:-1] & ~blank[1:])) + int(np.count_nonzero(~blank[:1]))
+    try:
+        values: NDArray[Any] = np.fromstring(text, kind, sep=" ") if count else np.zeros(0, kind)
+    except ValueError:
+        return None
+    return values if len(values) == count else None
 
 
 def hashes(points: Floats) -> Indices:

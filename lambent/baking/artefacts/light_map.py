@@ -44,7 +44,10 @@ PHOTONS, MOMENTS = "light_map/photons", "light_map/leaning"
 # Share of lit texels whose noise exceeds their light: at most .10 in 23 rooms, .28 and .35 in two lit through a keyhole
 # and by a spot of one degree, which lose a third of their light.
 NOISY = 0.2
-TOO_DARK = "%.0f %% of the light map is lit by paths too rare to be found often: it may be blotched and too dark there"
+TOO_DARK = (
+    "%.0f %% of the light map is lit by paths too rare to be found often: there it is too dark. "
+    "A higher --quality finds more"
+)
 SIGNS = (1.0, -1.0)  # of the normal, by side
 Maps = list[tuple[Floats, dict[str, float]]]  # by side: irradiance (H, W, 3) and its notes
 
@@ -374,7 +377,8 @@ def _noise(context: BakeContext) -> None:
     hidden = 0.0
     for name, (both, known) in zip(NOISE, halves, strict=False):
         found = noise_map(both, known, context.traced.labels)
-        hidden = max(hidden, np.count_nonzero(found[known] > 1) / max(np.count_nonzero(found[known]), 1))
+        lit = found[known & (found > 0)]
+        hidden = max(hidden, float(np.mean(lit > 1)) if len(lit) else 0.0)
         context.put(KIND, name, found, context.provenance())
     if hidden > NOISY:
         log.warning(TOO_DARK, 100 * hidden)

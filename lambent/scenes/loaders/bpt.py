@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.arrays import Flags, Floats
+from lambent.core.arrays import Flags, Floats, numbers_in
 from lambent.core.ceilings import BPT_BYTES, TRIANGLES
 from lambent.core.errors import UserError
 from lambent.core.inputs import read_bytes
@@ -83,13 +83,11 @@ class _Numbers:
     def __init__(self, path: Path) -> None:
         self._path, self._at = path, 0
         self._data = read_bytes(path, BPT_BYTES).removeprefix(b"\xef\xbb\xbf").replace(b",", b" ")
-        try:
-            self._values = np.fromstring(self._data, sep=" ")
-        except ValueError:
-            self._values = np.zeros(0)
-        if len(self._values) != _words_in(self._data):  # "1.2.3" would be read as two numbers
+        found = numbers_in(self._data)
+        if found is None:
             text, line = self._word(lambda _, word: NUMBER.fullmatch(word) is None)
             raise UserError("has a word that is not a number", file=path, field=f"line {line}", got=repr(text[:40]))
+        self._values = found
 
     def integer(self, what: str, *, least: int, most: int | None = None) -> int:
         """The next number, which must be whole and within bounds."""
@@ -161,9 +159,3 @@ class _Numbers:
             return "", 1
         line = self._data[: place.start()].replace(b"\r\n", b"\n").replace(b"\r", b"\n").count(b"\n") + 1
         return place.group().decode("latin-1"), line
-
-
-def _words_in(data: bytes) -> int:
-    """The number of words between white space."""
-    letters = ~np.isin(np.frombuffer(data, np.uint8), np.frombuffer(b" \t\n\r\v\f", np.uint8))
-    return int(np.count_nonzero(letters[1:] & ~letters[:-1])) + int(letters[:1].sum())

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lambent.core.arrays import Floats, Indices, ranges
+from lambent.core.arrays import Floats, Indices, numbers_in, ranges
 from lambent.core.ceilings import FACE_CORNERS, PLY_BYTES, TRIANGLES
 from lambent.core.errors import UserError
 from lambent.core.inputs import read_bytes
@@ -184,10 +184,9 @@ class _Rows:
 
 def _doubles(text: bytes, path: Path) -> memoryview:
     """The numbers of a text as bytes of doubles."""
-    try:
-        values = np.fromstring(text, sep=" ")
-    except ValueError as error:
-        raise UserError("has a word that is not a number", file=path) from error
+    values = numbers_in(text)
+    if values is None:
+        raise UserError("has a word that is not a number", file=path)
     return values.view(np.uint8).data
 
 

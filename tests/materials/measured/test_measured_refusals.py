@@ -78,6 +78,8 @@ REFUSED: dict[str, list[tuple[str | bytes, str]]] = {
     "Cornell": [
         (CORNELL[:-12], "one value per column name"),
         (but(CORNELL, "0.2", "spam"), "not a number"),
+        (but(CORNELL, "0.2", "0.2.1"), "not a number; found 0.2.1"),
+        (but(CORNELL, " 0.2", " - 0.2"), "not a number; found -"),
         (but(CORNELL, "\n5\n", "\n500\n"), "one value per column name"),
         ("\n".join(CORNELL.split("\n")[:3]), "has no rows"),
         (CORNELL.replace(" 0.2 0.2 0.2 0.2 0.2", " -1 nan -1 -1 -1"), "no measured value"),

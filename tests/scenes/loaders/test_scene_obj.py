@@ -204,6 +204,10 @@ def test_odd_but_sound(tmp_path: Path) -> None:
 WRONG = {
     "v 1 2\n": r"line 10: v with too few numbers",
     "v 1 2 x\n": r"line 10: not a number; found x",
+    "v 1 2 - 3\n": r"line 10: not a number; found -",
+    "v 1 2 3 v 4 5 6\n": r"line 10: not a number; found v",
+    "f 1 2 3 f 2 3 4\n": r"line 10: not a number; found f",
+    "f - 3 - 2 - 1\n": r"line 10: not a number; found -",
     "f 1 2 9\n": r"line 10: corner has an unknown v; found 9; expected at most 4",
     "f 0 1 2\n": r"line 10: corner has an unknown v; found 0",
     "f 1 2/2 3\n": r"line 10: face cannot be read",

@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.arrays import Flags, Floats, Indices, numbers_in
 
 Rank = Literal[3, 4]
 
@@ -305,10 +305,7 @@ def numbers_of(text: bytes) -> Floats:
     Malformed
         A word is not a number.
     """
-    blank = text.translate(_BLANKED)
-    if not blank.strip():
-        return np.zeros(0)
-    try:
-        return np.fromstring(blank, sep=" ")
-    except ValueError as error:
-        raise Malformed("a word that is not a number") from error
+    found = numbers_in(text.translate(_BLANKED))
+    if found is None:
+        raise Malformed("a word that is not a number")
+    return found

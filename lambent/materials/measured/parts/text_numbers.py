@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lambent.core.arrays import Floats
+from lambent.core.arrays import Floats, numbers_in
 from lambent.core.ceilings import MEASURED_BYTES
 from lambent.core.errors import UserError
 from lambent.core.inputs import read_bytes
@@ -77,12 +77,8 @@ def numbers(text: bytes, path: Path, field: str | None = None) -> Floats:
     UserError
         A word is not a number; the message names it, and decimal commas as such.
     """
-    if not text.strip():
-        return np.empty(0)
-    try:
-        return np.fromstring(text, dtype=np.float64, sep=" ")
-    except ValueError:
-        pass  # the slow search below finds the faulty word
+    if (found := numbers_in(text)) is not None:
+        return found
     for match in re.finditer(rb"\S+", text):
         try:
             float(match[0])

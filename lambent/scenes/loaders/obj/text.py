@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lambent.core.arrays import Flags, Floats, Indices
+from lambent.core.arrays import Flags, Floats, Indices, numbers_in
 from lambent.core.ceilings import CORNERS, OBJ_BYTES
 from lambent.core.errors import UserError
 from lambent.core.inputs import decoded, read_bytes
@@ -144,7 +143,8 @@ class _Block:
         first, last = lines[np.concatenate([[0], breaks])], lines[np.concatenate([breaks, [len(lines)]]) - 1]
         whole = self.bytes.data
         text = b"".join([whole[a:b] for a, b in zip(self.starts[first], self.ends[last] + 1, strict=True)])
-        text = text.replace(kind.encode() + b" ", b"")
+        word = b"\n" + kind.encode() + b" "
+        text = (b"\n" + text).replace(word, b"\n")[1:]
         return re.sub(rb"#[^\n]*", b"", text) if b"#" in text else text
 
     def numbers(self, lines: Indices, kind: str, width: int) -> Floats:
@@ -214,8 +214,8 @@ class _Block:
         return found
 
     def _parsed(self, text: bytes, kind: type, lines: Indices) -> np.ndarray[Any, Any]:
-        with suppress(ValueError):  # the faulty line is found below
-            return np.fromstring(text, dtype=kind, sep=" ")
+        if (values := numbers_in(text, kind)) is not None:
+            return values
         for line, words in zip(lines, text.split(b"\n"), strict=False):
             for word in words.split():
                 try:
