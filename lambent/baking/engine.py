@@ -251,7 +251,7 @@ def _read_cache(key: str) -> Engine | None:
 
 
 def _write_cache(key: str, found: Engine) -> None:
-    with suppress(OSError):  # a read-only home only costs the probe's seconds every time
+    with suppress(UserError):  # a home that is full or read-only only costs the probe's seconds every time
         if file := _cache_file():
             write_text(file, json.dumps({"key": key, "engine": asdict(found)}))
 

@@ -33,6 +33,13 @@ def test_cache_of_another_library_is_not_used(own_cache):
     assert module._read_cache("key of another machine") == module.Engine("llvm_ad_rgb", "19.1.7", 2)
 
 
+def test_a_home_that_cannot_be_written_stops_nothing(own_cache, monkeypatch):
+    own_cache.write_text("a file, where the cache's folder would be")
+    monkeypatch.setattr(module, "_cache_file", lambda: own_cache / "engine.json")
+    module._write_cache("key", module.Engine("llvm_ad_rgb", "19.1.7", 2))
+    assert module._read_cache("key") is None
+
+
 def test_a_wrong_library_is_an_error_that_names_the_mend(own_cache, monkeypatch):
     monkeypatch.setenv(module.LIBRARY_VARIABLE, "/nowhere/libLLVM.so")
     monkeypatch.setenv(module.VARIANT_VARIABLE, "llvm_ad_rgb")
