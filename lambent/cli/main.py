@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 INTERRUPTED = 130
 AGAIN_S = 0.02
 INTERRUPTION = "lambent: interrupted; finished work is kept\n"
+UNNAMED = "output, or a cache of compiled kernels (of Dr.Jit or numba)"  # a file that a fault of the disk does not name
 NO_ROOM = "failed to map segment"  # message of the ImportError if a library does not fit into memory
 MEMORY = "out of memory; close other programs, raise the limit (ulimit -v), or ask for less"
 LOST = "the graphics device was lost, as when its driver restarts; a window's edits are in its session: start again"
@@ -99,7 +100,7 @@ def run(arguments: list[str]) -> int:
         return 1
     except Exception as error:
         if isinstance(error, OSError) and error.errno in FAULTS_OF_THE_DISK:
-            return _fail(f"{error.filename or 'output'}: cannot be written ({error.strerror})")
+            return _fail(f"{error.filename or UNNAMED}: cannot be written ({error.strerror})")
         if is_interruption(error):
             code = INTERRUPTED
         elif isinstance(error, ModuleNotFoundError) and (said := missing(error)) is not None:

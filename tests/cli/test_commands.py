@@ -13,6 +13,7 @@ import pytest
 
 from lambent import __version__, cli
 from lambent.cli import materials
+from lambent.cli.main import UNNAMED
 from lambent.core.discovery import names_in
 from lambent.core.pictures.images import write_image, write_shown
 from lambent.materials.document import Lobe, Material, load_material
@@ -151,7 +152,7 @@ def test_an_interrupted_fit_gives_the_best_so_far_and_130(lambent, monkeypatch, 
 
 @pytest.mark.parametrize(
     ("error", "said"),
-    [((28, "No space left on device"), "output: cannot be written (No space left on device)"),
+    [((28, "No space left on device"), f"{UNNAMED}: cannot be written (No space left on device)"),
      ((2, "No such file or directory", "/proc/d.png"), "/proc/d.png: cannot be written (No such file or directory)")],
 )  # fmt: skip
 def test_a_disk_that_takes_no_file_is_one_line(lambent, monkeypatch, pictures, tmp_path, error, said):

@@ -34,8 +34,8 @@ def volume(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def filled(folder: Path) -> Iterator[None]:
-    """Nothing free on the volume of `folder`."""
+def filled(folder: Path, free: int = 0) -> Iterator[None]:
+    """So many bytes, full pages of memory, free on the volume of `folder`."""
     ballast = folder / "ballast"
     with ballast.open("wb", buffering=0) as file:
         for size in (1 << 20, 1 << 12):
@@ -44,6 +44,7 @@ def filled(folder: Path) -> Iterator[None]:
                     file.write(bytes(size))
             except OSError as error:
                 assert error.errno == errno.ENOSPC
+        file.truncate(file.tell() - free)
     try:
         yield
     finally:

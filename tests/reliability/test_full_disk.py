@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 import shutil
 import sys
@@ -15,15 +16,22 @@ from typing import Any
 import numpy as np
 import pytest
 
+from lambent.baking.bake import bake
+from lambent.baking.transport.view import View
+from lambent.bench import card
+from lambent.bench.card_rows.ledger import FIGURE
 from lambent.cli import main
 from lambent.core.discovery import modules_in
 from lambent.core.errors import UserError
 from lambent.core.pictures.images import write_image
 from lambent.core.views.camera import Camera, CameraPath
+from lambent.editing.session.session import Session
 from lambent.materials import export
 from lambent.materials.document import Lobe, Material
+from lambent.scenes.loaders.load import load_scene
 from lambent.store.kept import session, views
 from lambent.store.store import Store
+from lambent.viewer.modes.edit import worker
 from lambent.viewer.modes.walk.views.views import write_alone
 from lambent.viewer.settings import Remembered
 from tests.reliability import full_disks
@@ -41,14 +49,24 @@ COMMANDS = {  # by name and options: arguments; OUT is the file before its endin
     "inspect --plot .pdf": "inspect glossy.json --plot OUT.pdf",
     "inspect --plot .svg": "inspect glossy.json --plot OUT.svg",
     "lightmap -o": "lightmap box.store -o OUT.exr --force",
+    "export -o": "export boxSEED.store -o OUT",
+    "export -o --as html": "export boxSEED.store -o OUT --as html --size 16x16",
     "fit -o": "fit glossy.txt --lobes 1 -o OUT.json --force",
     "fit --plot": "fit glossy.txt --lobes 1 --plot OUT.png",
+    "fit --report": "fit glossy.txt --lobes 1 --report OUT.html",
     "illuminance -o .csv": "illuminance box.store --object floor -o OUT.csv --force",
     "illuminance -o .pdf": "illuminance box.store --object floor -o OUT.pdf",
+    "relight -o .png": "relight tray.store -o OUT.png",
+    "relight -o .exr": "relight tray.store -o OUT.exr --force",
+    "render -o .png": "render box.store -o OUT.png --size 16x16 --samples 1",
+    "render -o .exr": "render box.store -o OUT.exr --size 16x16 --samples 1 --force",
+    "render -o .hdr": "render box.store -o OUT.hdr --size 16x16 --samples 1 --force",
+    "render -o .mp4": "render box.store -o OUT.mp4 --path tour --size 32x32 --fps 1 --integrator diffuse",
+    "render -o ####": "render box.store -o OUT-####.png --path tour --size 16x16 --fps 1 --integrator diffuse",
+    "render -o --variants": "render box1.store -o OUT.png --variants --size 16x16 --samples 1",
 }
-UNTRIED = {  # not on a full disk yet
-    "export -o", "render -o", "relight -o", "edit -o", "bench -o", "fit --report", "demo --out",
-}  # fmt: skip
+ALONE = ("bench -o", "edit -o")  # tried below
+UNTRIED = ("demo --out",)
 FOLDERS = ("bake -o",)  # a store is changed in place
 KEPT: dict[str, tuple[str, Callable[[Path], object]]] = {  # file of a window, and its writer
     "session": (session.FILE, lambda file: session.write_session(file, WALKED)),
@@ -60,7 +78,7 @@ KEPT: dict[str, tuple[str, Callable[[Path], object]]] = {  # file of a window, a
 TOUR = CameraPath(
     name="tour", keys=(EYE, replace(EYE, name="b", position=(0.0, 0.2, 0.0))), seconds=2.0, times_s=(0.0, 2.0)
 )
-WALKED = session.WalkSession(states={f"{n}": session.RoomState(materials={"a": GLOSSY}) for n in range(20)})
+WALKED = session.WalkSession(states={"glossy": session.RoomState(materials={"red": GLOSSY})})
 
 
 def put(folder: Path) -> None:
@@ -72,8 +90,12 @@ def put(folder: Path) -> None:
 def inputs(baked_box: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Files that the commands read."""
     folder = tmp_path_factory.mktemp("inputs")
-    shutil.copytree(baked_box, folder / "box.store")
+    for name in ("box", "box0", "box1"):
+        shutil.copytree(baked_box, folder / f"{name}.store")
     views.change_views(folder / "box.store", lambda _: views.Views(paths=(TOUR,)))
+    session.write_session(folder / "box1.store" / session.FILE, WALKED)
+    tray = load_scene("builtin:teatray")
+    bake(tray, folder / "tray.store", only={"relighting"}, views=[View(tray.cameras[0], 16, 12)]).close()
     for name, value in (("a", 0.2), ("b", 0.4)):
         write_image(folder / f"{name}.png", np.full((16, 16, 3), value, np.float32))
     GLOSSY.save(folder / "glossy.json")
@@ -136,6 +158,58 @@ def test_commands(
     assert main.run(words_of(name, folder, inputs, 1)) == 0, "once there is room again"
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("disk", ["volume"], indirect=True)
+@pytest.mark.parametrize("free", [1 << 14, 1 << 17, 1 << 18])
+def test_a_site_stays_where_its_successor_does_not_fit(
+    free: int, disk: tuple[Path, Full], inputs: Path, device: Any
+) -> None:
+    """The disk is full after some of its data, all of them, and some of the page."""
+    folder, _ = disk
+    assert main.run(words_of("export -o", folder, inputs, 0)) == 0
+    former = content(folder)
+    with full_disks.filled(folder, free):
+        assert main.run(words_of("export -o", folder, inputs, 1)) == 2
+        assert content(folder) == former
+    assert main.run(words_of("export -o", folder, inputs, 1)) == 0 and content(folder) != former
+
+
+@pytest.mark.parametrize("disk", ["limit"], indirect=True)
+def test_rows_of_a_bench(
+    disk: tuple[Path, Full], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Measured ones are kept; figures of another source stand for those of a card."""
+    folder, full = disk
+    monkeypatch.setattr(card, "figures", lambda *_: iter([dict.fromkeys(FIGURE, 1.0)]))
+    words = ["bench", "card", "--quick", "-o", str(folder / "card.json")]
+    with full():
+        assert main.run(words) == 2
+    refused(capsys.readouterr().err.splitlines()[-1], folder)
+    assert not content(folder)
+    assert main.run(words) == 0 and json.loads((folder / "card.json").read_text())["done"]
+    former = content(folder)
+    with full():
+        assert main.run(words) == 0, "nothing is left to measure or to write"
+    assert content(folder) == former
+
+
+@pytest.mark.long
+def test_the_store_of_edits(disk: tuple[Path, Full], mi: Any) -> None:
+    """What the window's worker bakes into it."""
+    folder, full = disk
+    tray = load_scene("builtin:teatray")
+    name = tray.objects[0].material
+    edits, store = folder / "tray.edits.json", folder / "tray.store"
+    Session.new("builtin:teatray", tray.cameras[0], {name: tray.materials[name]}, size=(8, 6)).save(edits)
+    for lights in (1, 2):
+        with full(), pytest.raises(UserError) as caught:
+            worker.main(edits, store, [lights])
+        refused(str(caught.value), folder)
+        worker.main(edits, store, [lights])  # once there is room again
+        with Store.open(store) as whole:
+            assert all(whole.availability(one.name)[0] == "complete" for one in whole.artefacts())
+
+
 @pytest.mark.parametrize("name", KEPT)
 def test_what_a_window_saves(name: str, disk: tuple[Path, Full]) -> None:
     folder, full = disk
@@ -176,7 +250,7 @@ def test_settings_are_told_not_raised(disk: tuple[Path, Full]) -> None:
 def test_every_command_that_writes_is_here() -> None:
     import typer
 
-    known = {" ".join(name.split()[:2]) for name in COMMANDS} | UNTRIED
+    known = {" ".join(name.split()[:2]) for name in COMMANDS} | {*ALONE, *UNTRIED}
     group: Any = typer.main.get_command(main.build_app())
     found = {
         f"{name} {option}"
