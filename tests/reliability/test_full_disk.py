@@ -277,12 +277,14 @@ WRITES = ("write_bytes", "write_text", "copyfile", "copy", "copy2")  # of paths,
 
 
 def unprotected(tree: ast.AST, within: bool = False) -> Iterator[int]:
-    """Lines that call a method of WRITES outside `atomic_path`."""
+    """Lines that call a method of WRITES outside `atomic_path`, or on another path than it gives."""
     for node in ast.iter_child_nodes(tree):
         inner = within
         if isinstance(node, ast.With):
             inner |= any("atomic_path" in ast.dump(item.context_expr) for item in node.items)
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and not within:
+            if "atomic_path" in ast.dump(node.func.value):  # enter_context(atomic_path(...)).write_bytes(...)
+                continue
             of_shutil = isinstance(node.func.value, ast.Name) and node.func.value.id == "shutil"
             if node.func.attr in WRITES[:2] or (of_shutil and node.func.attr in WRITES[2:]):
                 yield node.lineno
