@@ -68,6 +68,7 @@ def test_finished_references_are_the_truth_of_rows_of_their_size(coarse_box, tmp
     assert both[0]["flip"] != alone[0]["flip"]
 
 
+@pytest.mark.long
 def test_references_that_cannot_be_used_are_named(coarse_box, tmp_path):
     for name, shape in (("small", (4, 6, 3)), ("large", (8, 6, 3)), ("shown", (4, 6, 3))):
         write_image(tmp_path / (name + (".png" if name == "shown" else ".exr")), np.ones(shape, np.float32))

@@ -130,6 +130,7 @@ def test_things_by_mouse_and_keys(chromium, site, hit):
         assert faults == []
 
 
+@pytest.mark.long
 def test_walks_links_and_pictures(chromium, device, store, site):
     with chromium() as page, served(site) as address:
         faults = opened(page, address)

@@ -95,6 +95,7 @@ def test_gathered_light_is_that_of_whole_paths(room: TracedRoom, paths: TracedRo
     assert (one < 0.01 * found).all() and (other < 0.01 * true).all()
 
 
+@pytest.mark.long
 def test_a_mix_is_the_scene_with_other_lamps(store: Store) -> None:
     scene, factors = lit_room(), {"lamp": (0.2, 0.5, 1.0), "bulb": (2.0, 2.0, 2.0)}
     objects = tuple(replace(o, emission=tuple(np.multiply(o.emission, factors["lamp"]))) for o in scene.objects)
@@ -139,6 +140,7 @@ def test_parts_of_the_light_add_up(room: TracedRoom) -> None:
     np.testing.assert_allclose(gathered[shows_lamp], lamp.max(), rtol=1e-4)
 
 
+@pytest.mark.long
 def test_the_sky_is_in_neither_part(tmp_path: Path) -> None:
     scene = replace(plane(), environment=ConstantEnvironment((1.0, 1.0, 1.0)))
     baked = bake(scene, tmp_path / "s", quality=TINY, only=("light_map",))
@@ -154,6 +156,7 @@ def test_a_replacing_mesh_is_lit_although_it_has_no_texels(store: Store) -> None
     assert np.abs(found - expected).max() < 0.03 * expected.max()
 
 
+@pytest.mark.long
 def test_the_stated_noise_is_the_error(room: TracedRoom) -> None:
     """Both are relative to a pixel's own light; the truth is the mean of many pictures with the same samples."""
     pictures = [traced(room, 48, seed) for seed in range(12)]
@@ -184,6 +187,7 @@ def test_bands_of_a_large_picture_are_the_picture(room: TracedRoom, monkeypatch:
         np.testing.assert_allclose(one, other, rtol=1e-5)
 
 
+@pytest.mark.long
 def test_edits_sizes_and_counts_compile_nothing(store: Store) -> None:
     """Every number that changes from picture to picture is read from memory; a material's structure is compiled."""
     import drjit as dr

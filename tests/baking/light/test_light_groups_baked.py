@@ -100,6 +100,7 @@ def test_groups_add_up_to_all_light(by_group: Any) -> None:
     assert_same_image(total, pooled(total, bound), expected[0], pooled(expected[0], its_variance[0]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["sky", "panel"])
 def test_a_group_is_the_light_of_its_emitters_alone(by_group: Any, name: str) -> None:
     mean, variance, names = by_group
@@ -114,6 +115,7 @@ def test_a_group_is_the_light_of_its_emitters_alone(by_group: Any, name: str) ->
     assert_same_image(found, pooled(found, its), expected[0], pooled(expected[0], its_variance[0]))
 
 
+@pytest.mark.long
 def test_direct_light_of_the_sun_is_left_out_and_its_bounces_are_not(by_group: Any) -> None:
     mean, _, names = by_group
     sun, count = names.index("sun"), len(names)
@@ -121,6 +123,7 @@ def test_direct_light_of_the_sun_is_left_out_and_its_bounces_are_not(by_group: A
     assert mean[sun].mean() > 1, "the wall throws it onto the floor"
 
 
+@pytest.mark.long
 def test_light_of_a_bulb_comes_straight_or_by_others(by_group: Any) -> None:
     """The part that is direct against the inverse square law."""
     mean, variance, names = by_group

@@ -138,6 +138,7 @@ def test_a_worker_that_is_killed_is_survived(alone: Store, two: DaskWorkers, tmp
     assert_same(baked(tmp_path / "s", two, progress), alone)
 
 
+@pytest.mark.long
 def test_a_bake_that_is_interrupted_leaves_workers_that_go_on(alone: Store, two: DaskWorkers, tmp_path: Path) -> None:
     def stop(done: float, total: float, what: str) -> None:
         if "64 samples" in what and done == 1:

@@ -24,6 +24,7 @@ def lobe_of(state):
     return state["edited"].get("brass", {"lobes": [{}]})["lobes"][0]
 
 
+@pytest.mark.long
 def test_drag_undo_and_orbit(session):
     start = session.wait_for(lambda state: state["editor"]["exact"])
     session.drag(session.point("mx", 0.5), session.point("mx", 0.75))

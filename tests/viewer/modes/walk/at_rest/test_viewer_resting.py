@@ -10,6 +10,7 @@ from tests.viewer.window_session import SKIP
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.long
 def test_the_window_sleeps_until_a_picture_is_traced_and_learns_that_tracing_has_ended(
     baked_box, open_window, tmp_path
 ):

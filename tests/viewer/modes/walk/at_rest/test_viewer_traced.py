@@ -306,6 +306,7 @@ def test_light_follows_edits_as_baked_estimated_or_rebaked(renderer, store, stat
     assert np.abs(as_baked - truth).mean() > 0.15 * truth.mean(), "the light of the store's own materials"
 
 
+@pytest.mark.long
 def test_a_film_is_traced_frame_by_frame(pictures, state, tmp_path):
     camera = state.navigation.camera
     state.films.file_name, state.films.size, state.films.quality = "a-##.exr", "640 x 360", "traced, 16 samples"

@@ -84,6 +84,7 @@ def image(renderer):
     return np.asarray(renderer.still_radiance(state, 1), float)
 
 
+@pytest.mark.long
 def test_light_baked_again_is_drawn_as_a_bake_of_the_edited_scene_is(stores):
     store, copy, edits = stores
     device = open_device()
@@ -102,6 +103,7 @@ def test_light_baked_again_is_drawn_as_a_bake_of_the_edited_scene_is(stores):
     assert off.mean() < 0.02, "but at edges of shadows"
 
 
+@pytest.mark.long
 def test_regions_wait_for_what_the_map_holds_of_lamps(stores):
     store, copy, _ = stores
     scene = read_baked(Store.open(store))
