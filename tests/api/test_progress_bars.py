@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import nbformat
+import pytest
 
 from tests.api.executed import ROOT, run
 
@@ -27,6 +28,7 @@ except ValueError:
 """
 
 
+@pytest.mark.long
 def test_a_cell_has_one_line():
     cells = [WORK.format(reports=100), WORK.format(reports=1), FAILS]
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(one) for one in cells])

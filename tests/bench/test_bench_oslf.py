@@ -24,6 +24,7 @@ def view(mi: Any, tmp_path_factory: pytest.TempPathFactory) -> LightFieldView:
     return LightFieldView(load_scene("builtin:box"), "sphere", 0, (128, 128), 8, folder, oslf.SMALL)
 
 
+@pytest.mark.long
 def test_maps_hold_what_the_traced_rays_meet(view: LightFieldView) -> None:
     """Where the maps are read at the true hits, only their texels are left as an error."""
     field = view.field(144, TEXELS, 1)

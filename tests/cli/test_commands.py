@@ -114,6 +114,7 @@ def test_inspect_material_and_plot(lambent, material, tmp_path):
     assert "mx" in lambent("inspect", material).out
 
 
+@pytest.mark.long
 def test_fit_writes_a_material_that_check_takes(lambent, shared_data, tmp_path):
     file = shared_data / "measured/cornell/garnet_red.brdf"
     facts = lambent("fit", file, "-o", tmp_path / "m.json", "--json").json

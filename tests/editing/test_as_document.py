@@ -106,6 +106,7 @@ def test_what_was_edited_becomes_a_curve_lobe_and_the_rest_stays() -> None:
     assert l1_share(found, edited) < 0.02
 
 
+@pytest.mark.long
 def test_a_curve_lobe_is_edited_without_a_fit(fitted: list[MeasuredSamples]) -> None:
     material = Material(
         kd=0.2, kd_curve=KD_CURVE, lobes=(curve_lobe(mx=0.2, my=0.1), curve_lobe(mx=0.3, my=0.3, side="transmission"))

@@ -360,6 +360,7 @@ def test_the_rest_is_checked_before_anything_is_fitted(
         Session.open(file)
 
 
+@pytest.mark.long
 def test_damaged_documents_are_read_or_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Never another error; without fits, which know nothing of the file."""
     curves = {"highlight": layers(layer("translate_y", 2.0), layer("amplify_x", 1.1)), "diffuse": drawn([0, 1], [1, 2])}

@@ -50,6 +50,7 @@ def test_each_level_shrinks_the_interval_by_n_minus_1(problem, levels):
     assert found.shape[0] == pytest.approx(0.15, abs=0.15 * pitch + 0.001)
 
 
+@pytest.mark.long
 def test_the_known_lobe_is_found(problem):
     found = searched(problem, Schedule(), {})
     assert found.shape[0] == pytest.approx(0.15, rel=0.03)

@@ -241,6 +241,7 @@ def _zeros(count: int, **more: Any) -> dict[str, Any]:
     return content
 
 
+@pytest.mark.long
 def test_accessors_without_a_buffer_view(tmp_path: Path) -> None:
     """One that is too large, and thousands that are small."""
     with pytest.raises(UserError, match=r"accessors.0: too many zeros; found 6000000 numbers"):

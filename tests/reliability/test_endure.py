@@ -25,7 +25,7 @@ def torn(folder: Path) -> None:
     (folder / "views.json").unlink()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_saves_of_a_session_survive_kills(tmp_path: Path) -> None:
     one, result = Endurance("session", tmp_path), Result()
     for seed in range(2):

@@ -142,6 +142,7 @@ def test_so_many_samples_are_taken(store: Path) -> None:
         np.testing.assert_array_equal(drawn.radiance(FRONT), renderer.converged(frame, samples))
 
 
+@pytest.mark.long
 def test_a_film_shows_single_frames_and_a_still_the_mean_of_many(store: Path) -> None:
     opened = Store.open(store)
     renderer = Renderer(open_device(), opened)

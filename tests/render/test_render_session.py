@@ -179,6 +179,7 @@ def test_states_show_their_lamps_also_one_after_the_other(adapter: None, store: 
     assert np.abs(alone[0] - alone[1]).max() > 0.01 * alone[1].max()
 
 
+@pytest.mark.long
 def test_options_that_are_given_apply(
     adapter: None, store: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

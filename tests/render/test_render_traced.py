@@ -48,6 +48,7 @@ def test_a_still_ends_at_its_noise_or_its_samples(store: Path, tmp_path: Path) -
     assert (counted.samples, counted.noise) == (3, None)
 
 
+@pytest.mark.long
 def test_it_shows_what_paths_show(store: Path) -> None:
     many = replace(TRACED, samples=400)
     found, true = drawn(store, many), drawn(store, replace(many, integrator="path", denoise=True))
@@ -114,6 +115,7 @@ def test_ctrl_c_keeps_the_picture_so_far(store: Path, tmp_path: Path) -> None:
         film(store, tmp_path / "b-#.exr", settings=replace(TRACED, samples=1000), progress=press)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("place", "why"), [(None, "no path of its scene"), ("gone/scene.toml", "is not there")])
 def test_a_store_without_its_scene_is_drawn(
     adapter: None, store: Path, tmp_path: Path, place: str | None, why: str

@@ -56,6 +56,7 @@ def store(tmp_path: Path) -> Path:
     return add_variants(with_light_groups(write_small_store(tmp_path / "s")), VARIANTS)
 
 
+@pytest.mark.long
 def test_a_store_without_an_answer_shows_the_material_and_says_the_rest(adapter: None, tmp_path: Path) -> None:
     bare, notes = add_variants(write_small_store(tmp_path / "s"), VARIANTS), list[str]()
     red = image(bare, replace(SMALL, variant="red"), tmp_path, notes)

@@ -47,7 +47,7 @@ def test_a_visit(chromium, box_site):
         assert faults == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_lost_device_comes_back(chromium, box_site):
     with chromium() as page, served(box_site) as address:
         page.goto(address)
@@ -58,7 +58,7 @@ def test_a_lost_device_comes_back(chromium, box_site):
         page.wait_for_selector("#message:empty", state="attached")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_damaged_or_missing_file_is_said(chromium, box_site, tmp_path):
     damaged = shutil.copytree(box_site, tmp_path / "damaged")
     manifest = json.loads((box_site / "manifest.json").read_text())

@@ -37,7 +37,7 @@ PIXELS = """async ([width, height]) => {
 }"""
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_first_picture_is_coarse_and_the_last_exact(chromium, box_site, streamed_site):
     found = {}
     for site in (box_site, streamed_site):
@@ -55,7 +55,7 @@ def test_the_first_picture_is_coarse_and_the_last_exact(chromium, box_site, stre
     assert 0.01 < np.abs(coarse - exact).mean() < 6, "and the first picture is nearly that"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_file_that_fails_after_the_first_picture_is_tried_again(chromium, streamed_site):
     manifest = manifest_of(streamed_site)
     large = [manifest["tables"]["texture"][at]["data"] for at in manifest["states"][0]["finer"]]

@@ -33,7 +33,7 @@ def test_where_webgpu_is_missing(chromium, box_site, script, host, words):
         assert page.is_visible("#poster") and not page.is_visible("#share")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_where_scripts_do_not_run(chromium, box_site, tmp_path):
     """Opened from the disk; without JavaScript; with a module missing."""
     with chromium(flags=PLAIN) as page:

@@ -166,7 +166,7 @@ def assert_before_and_after(page, stills, view, before, after, at: int):
             assert right < 2 and wrong > 3 * right
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_before_and_after(chromium, stills):
     """By keys, by touch, with other states and another view; from a server and from the disk."""
     with chromium(has_touch=True) as page, served(stills) as address:
@@ -196,7 +196,7 @@ def test_before_and_after(chromium, stills):
         assert faults == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_without_scripts_and_on_paper_all_stills_are_there(chromium, stills):
     with chromium(java_script_enabled=False) as page, served(stills) as address:
         page.goto(address, wait_until="load")

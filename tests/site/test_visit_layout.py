@@ -55,6 +55,7 @@ NAMED = (
 )  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("width", "height"), [(320, 568), (1280, 720), (568, 320)])
 def test_many_and_long_names_fit(chromium, box_site, width, height):
     with chromium(flags=("--no-sandbox", "--disable-features=WebGPU")) as page, served(box_site) as address:

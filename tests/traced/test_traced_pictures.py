@@ -149,6 +149,7 @@ def test_the_sky_is_in_neither_part(tmp_path: Path) -> None:
     assert means == [pytest.approx(1), 0, 0]
 
 
+@pytest.mark.long
 def test_a_replacing_mesh_is_lit_although_it_has_no_texels(store: Store) -> None:
     scene, ball = lit_room(), Replacement("cube", sphere(1.0, 32, 16), "wall")
     expected, _ = brightness(room_of_paths(scene, replacements=[ball]), path=True)

@@ -194,6 +194,7 @@ def test_what_cannot_be_is_said(store: Store, view: RelitView) -> None:
     assert view_artefact_name(CAMERA, *SIZE, "relighting", "spans") in store
 
 
+@pytest.mark.long
 def test_the_command_draws_what_python_draws(store: Store, view: RelitView, folder: Path) -> None:
     picture, out = sky(folder, "b.exr", 2), folder / "out.exr"
     assert run(["relight", str(store.folder), "-o", str(out), "--environment", str(picture), "--up", "+x",

@@ -187,6 +187,7 @@ def test_closed_box_of_albedo_and_emission_one_half_has_radiance_one(mi):
     assert np.array(mi.render(furnace_box(table), spp=256)).mean() == pytest.approx(1.0, abs=0.003)
 
 
+@pytest.mark.long
 def test_an_rgl_file_is_mitsubas_own_measured(mi, shared_data):
     """To the .5 % of the resampling. Mitsuba gives the file the viewer where we give it the light."""
     file = shared_data / "measured" / "rgl" / "satin_rosaline_rgb.bsdf"

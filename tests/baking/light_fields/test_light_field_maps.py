@@ -164,6 +164,7 @@ def test_an_interrupted_bake_ends_with_the_same_bits(store: Store, tmp_path: Pat
     assert before.items() <= after.items() and len(after) == 4
 
 
+@pytest.mark.long
 def test_only_what_is_asked_is_baked_and_what_is_no_longer_asked_goes(tmp_path: Path) -> None:
     scene = coloured_room()
     names = {light_field_name("ball", part) for part in PARTS}
@@ -247,6 +248,7 @@ def test_lamps_smaller_than_texels_keep_their_light(mi: Any) -> None:
     assert without < 0.85 and found == pytest.approx(1, abs=0.06), (without, found)
 
 
+@pytest.mark.long
 def test_the_disc_of_the_sun_is_left_out(mi: Any) -> None:
     """Pixels add it. Seen from an open place, maps with and without it differ by the irradiance that it has."""
     floor = SceneObject("floor", patch((-1, -5, 1), (2, 0, 0), (0, 0, -2)), "black")

@@ -160,6 +160,7 @@ def test_the_probe_of_a_thing_within_another_is_moved_out() -> None:
     assert np.allclose(centre_of((block, ball), "ball"), (1.02, 0, 0), atol=0.06)
 
 
+@pytest.mark.long
 def test_a_glossy_room_of_one_mesh_sees_itself(tmp_path: Path) -> None:
     scene = room_with_step()
     glossy = Material(kd=0.5, lobes=(Lobe(mx=0.3, my=0.3),))

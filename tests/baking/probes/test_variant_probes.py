@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from lambent.baking.bake import bake
 from lambent.realtime.light.baked import read_baked
 from lambent.scenes.looks.variants import VariantByObject, with_variants
@@ -12,6 +14,7 @@ from lambent.scenes.scene import Look
 from tests.baking.small_scenes import MIRROR, TINY, room_with_step
 
 
+@pytest.mark.long
 def test_an_object_that_a_variant_makes_glossy_has_a_probe(tmp_path: Path) -> None:
     plain = room_with_step()
     matte, shiny = {name: Look(m) for name, m in plain.materials.items()}, Look(MIRROR)

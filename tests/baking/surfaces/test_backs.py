@@ -81,6 +81,7 @@ def test_the_back_of_a_strip_that_fills_little_of_the_view_is_lit(tmp_path: Path
     assert backs_of(bake(few, tmp_path / "s", quality=LIGHT, only=("geometry",))) == {"crate", "shelf", "strip"}
 
 
+@pytest.mark.long
 def test_backs_stay_as_found_when_a_camera_comes_later(tmp_path: Path) -> None:
     alone = replace(scene(), cameras=())
     store = bake(alone, tmp_path / "s", quality=LIGHT, only=("light_map",))

@@ -134,6 +134,7 @@ def scene_of(*meshes: Mesh) -> Scene:
     return Scene("m", tuple(SceneObject(f"o{i}", mesh, "grey") for i, mesh in enumerate(meshes)), {"grey": GREY})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("resolution", "count"), [(96, 1500), (256, 20)])
 def test_charts_fill_the_map(resolution: int, count: int) -> None:
     """Texels that lie on surfaces, whether charts are large, of a few texels, or smaller than one and merged."""

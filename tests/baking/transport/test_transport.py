@@ -194,6 +194,7 @@ def test_solid_angles_of_small_triangles_do_not_cancel() -> None:
     assert solid_angles(corners) == pytest.approx(0.5e-8, rel=1e-6)
 
 
+@pytest.mark.long
 def test_retro_lobes_see_the_light_turned_about_the_normal() -> None:
     """On a free floor a retro lobe shows what the same lobe about the mirror direction shows under turned light."""
     lights = environment_triangles(*environment(), 200)

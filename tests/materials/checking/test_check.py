@@ -50,6 +50,7 @@ def quick_table(monkeypatch):
         monkeypatch.setattr(place, "THETA_DEG", (0, 30, 60, 75, 84, 89))
 
 
+@pytest.mark.long
 def test_a_sound_table_passes_and_the_report_is_json(quick_table):
     report = check_table(exact(), shape=SMALL)
     assert report.passed and not report.warnings, report
@@ -74,6 +75,7 @@ def test_a_table_that_returns_more_than_arrives_fails(quick_table):
     assert "without bound" in report.failures[0] and "1.1" in report.warnings[0]
 
 
+@pytest.mark.long
 def test_an_albedo_that_is_not_the_integral_fails(quick_table):
     """Its eval lacks a cosine that its albedo has."""
     table = FormulaTable(lambda wi, wo: exact().eval(wi, wo) * np.abs(wo[..., 2:]), channels=3, isotropic=True)
@@ -128,6 +130,7 @@ STEEP = Material(lobes=(Lobe(mx=0.5, my=0.5, r0=1, alpha=1),))
 BRIGHT = Material(kd=0.2, lobes=(Lobe(k=2, mx=0.2, my=0.2, r0=0.7, alpha=0.0),))
 
 
+@pytest.mark.long
 def test_normalised_does_not_exceed_one(few_directions):
     material, tame = FOIL, normalised(FOIL)
     assert furnace(material).highest[0] > 1 >= furnace(tame).highest[0]
@@ -137,6 +140,7 @@ def test_normalised_does_not_exceed_one(few_directions):
     assert check_sampler(MaterialBSDF(tame), theta, phi, samples=200_000).albedo_quadrature <= 1.002
 
 
+@pytest.mark.long
 def test_alpha_or_k_is_lowered_whichever_is_the_cause(few_directions):
     less_alpha, less_k = with_less_alpha(STEEP), with_less_k(STEEP)
     assert less_alpha.lobes[0].k == STEEP.lobes[0].k and 0 < less_alpha.lobes[0].alpha < 1

@@ -179,6 +179,7 @@ def test_trees_that_were_read_are_written_as_they_are(tmp_path: Path, rank: int)
     assert same_trees(tmp_path / "a.xml", tmp_path / "b.xml") and cost.lost == () and max(cost.share.values()) == 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["t3", "simple_tensor_d3_t3_refl", "simple_tensor_spot_refl"])
 def test_real_trees_come_back_and_radiance_agrees(shared_data: Path, tmp_path: Path, name: str) -> None:
     source, written = shared_data / "measured" / "lbnl" / f"{name}.xml", tmp_path / "written.xml"

@@ -114,6 +114,7 @@ def test_directions_are_drawn_about_the_light_for_retro_reflectors_alone(lobes, 
     assert [lobe.kind for lobe in proposal.lobes] == [kind for kind in kinds for _ in range(4)]
 
 
+@pytest.mark.long
 def test_samples_follow_their_density() -> None:
     assert_sampler(proposal_of(TAPES[1].measured(10.0)), 50.0, 20.0, samples=200_000)
 

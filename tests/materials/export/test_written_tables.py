@@ -304,6 +304,7 @@ def test_rgl(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert rgb.max() == pytest.approx(0.6 / np.pi, rel=0.01)
 
 
+@pytest.mark.long
 def test_klems_rings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The angle basis in the file is Klems's, and matt colour is XYZ of the equal-energy white."""
     monkeypatch.setattr(lbnl_xml, "LOBES_LOG2", 4)

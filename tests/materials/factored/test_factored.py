@@ -44,6 +44,7 @@ def test_a_blinn_lobe_of_exponent_0() -> None:
     assert found == pytest.approx([0.5524] * 3, abs=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "lobe", [Lobe(mx=0.1, my=0.1, r0=0.5), Lobe(mx=0.1, my=0.3, r0=0.5), Lobe(mx=0.005, my=0.005, r0=0.9)], ids=str
 )

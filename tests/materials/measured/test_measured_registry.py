@@ -156,6 +156,7 @@ def test_numbers_that_no_reader_claims(tmp_path: Path, content: bytes) -> None:
         load(tmp_path / "a.txt")
 
 
+@pytest.mark.long
 def test_names_that_utf_8_cannot_hold_are_written_as_escapes(tmp_path: Path) -> None:
     """A file system's name of any bytes reaches Python with lone surrogates in it."""
     path = tmp_path / os.fsdecode(b"m\xe4\xdfig.bsdf")

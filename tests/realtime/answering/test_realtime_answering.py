@@ -85,6 +85,7 @@ def test_light_of_changed_lobes_is_uncertain(store: Store) -> None:
     assert answer.likely_error(answer.lit({"grey": shiny})) > 1.4 * answer.likely_error(answer.lit({"grey": dull}))
 
 
+@pytest.mark.long
 def test_shown_answers_come_and_go(store: Store) -> None:
     baked, stored = read_baked(store), read_answer(store)
     renderer, answer = _renderer(store), AnsweredLight(baked, stored)

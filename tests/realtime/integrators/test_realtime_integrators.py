@@ -116,6 +116,7 @@ def test_seven_samples_hold_core_and_tail_of_a_curve(device, name: str, m: float
     assert np.abs(image - truth).mean() < {"haze": 0.075, "tail": 0.09, "flat": 0.025}[name] * truth.mean()
 
 
+@pytest.mark.long
 def test_a_retro_reflector_shows_the_light_behind_the_viewer(device) -> None:
     """A narrow lobe under a lamp that only one direction holds: every integrator looks back along the eye's ray."""
     mirror = Lobe(mx=0.004, my=0.004, r0=1.0, alpha=0.5)

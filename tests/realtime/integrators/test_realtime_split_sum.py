@@ -51,6 +51,7 @@ def test_seen_from_above_it_is_the_mean_over_the_lobe(device: Any, m: float) -> 
     np.testing.assert_allclose(image.mean(axis=(0, 1)), expected, rtol=0.06)
 
 
+@pytest.mark.long
 def test_a_brushed_lobe_looks_up_the_level_of_its_mean_roughness(device: Any) -> None:
     brushed, even = (seen(device, STATE, lamp, mx=mx, my=my) for mx, my in ((0.5, 0.125), (0.25, 0.25)))
     np.testing.assert_allclose(brushed, even, rtol=2e-3)

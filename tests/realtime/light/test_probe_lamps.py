@@ -138,6 +138,7 @@ def test_numpy_and_the_shader_take_out_as_many_groups() -> None:
     np.testing.assert_allclose(got, expected, atol=1e-4)
 
 
+@pytest.mark.long
 def test_faint_highlights_need_neither_lamps_nor_many_samples(device) -> None:
     """A window on rough varnish adds little to what is lit; a lamp on it, or the window on metal, is seen."""
     rough, metal = (Lobe(mx=0.2, my=0.2, r0=r0) for r0 in (0.04, 0.9))

@@ -37,6 +37,7 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> tuple[BakedScene, BakedSce
     return scenes[0], scenes[1]
 
 
+@pytest.mark.long
 def test_light_in_units_is_the_same_light(device, pair: tuple[BakedScene, BakedScene]) -> None:
     plain, scaled = pair
     assert (plain.unit, scaled.unit) == (1.0, UNIT)

@@ -123,6 +123,7 @@ def psnr_db(image: np.ndarray, exact: np.ndarray) -> float:
     return float(10 * np.log10(exact.max() ** 2 / np.mean((image - exact) ** 2)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("part", ["radiance", "sample_map"])
 def test_a_light_field_that_contradicts_itself_is_refused(tmp_path: Path, field: LightField, part: str) -> None:
     fewer = replace(

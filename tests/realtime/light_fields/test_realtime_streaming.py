@@ -49,6 +49,7 @@ def budgeted(device: Any, scene: BakedScene, maps: float) -> Renderer:
     return Renderer(device, replace(scene, light_field_mb=megabytes(device, scene.light_fields["ball"], maps)))
 
 
+@pytest.mark.long
 def test_all_maps_within_the_budget_change_nothing(device: Any, scene: BakedScene) -> None:
     exact, roomy = Renderer(device, scene), budgeted(device, scene, 64.5)
     np.testing.assert_array_equal(roomy.image(STATE), exact.image(STATE))

@@ -64,6 +64,7 @@ def check_line(renderer: Renderer, camera: Camera, record: ObjectRecord, names: 
     assert (alpha[~spread(border, REACH_PX)] == 0).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("camera", "name"), [(FRONT, "wall"), (BESIDE, "ball")])
 def test_the_line_runs_along_the_border_of_what_is_seen(renderer: Renderer, camera: Camera, name: str) -> None:
     check_line(renderer, camera, next(o for o in renderer.scene.record.objects if o.name == name), {name})

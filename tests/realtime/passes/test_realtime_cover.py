@@ -45,6 +45,7 @@ def light(encoded: np.ndarray) -> np.ndarray:
     return emitted - emitted[0, 0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("angle_deg", [10.0, 45.0])
 def test_slanted_wires_keep_their_light(device: Any, angle_deg: float) -> None:
     """A wire of three tenths of a pixel that moves by tenths: no step takes its light away or doubles it."""
@@ -53,6 +54,7 @@ def test_slanted_wires_keep_their_light(device: Any, angle_deg: float) -> None:
     np.testing.assert_allclose([image.sum() / truth for image in shown], 1, atol=0.1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("angle_deg", [0.0, 90.0])
 def test_upright_and_level_wires_are_lines_wherever_they_lie(device: Any, angle_deg: float) -> None:
     """One or two of five places see them: within two fifths of the truth, and the same all along the wire."""

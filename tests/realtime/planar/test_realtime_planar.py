@@ -132,6 +132,7 @@ def test_uniform_light_stays_uniform(device: Any) -> None:
     np.testing.assert_allclose(renderer.image(state(n=7))[HEIGHT // 2 :], 1.0, rtol=0.03)
 
 
+@pytest.mark.long
 def test_no_light_comes_in_below_the_walls(device: Any) -> None:
     """A closed room of radiance 1 under a sky of 1000: its floor of albedo 1 shows 1, up to the foot of every wall."""
     walls = {

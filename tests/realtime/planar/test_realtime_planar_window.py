@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import pytest
 
 import lambent.realtime.planar.planar_view
 from lambent.core.views.camera import Camera
@@ -51,6 +52,7 @@ def test_a_small_reflector_has_a_small_part_of_the_whole_buffer(monkeypatch: Any
     np.testing.assert_allclose(rays[0][:3], rays[1][:3], atol=1e-5)
 
 
+@pytest.mark.long
 def test_a_tray_is_as_with_the_whole_buffer(device: Any, monkeypatch: Any) -> None:
     """Where its lobe reaches no farther than the window, to the bit; wide lobes find their tails in the probe."""
     baked = scene_of(mirror(0.3))

@@ -78,6 +78,7 @@ def test_floor_gets_what_panes_let_through(device: Any) -> None:
     assert np.abs(found[under] - expected).max() < 0.003 * count
 
 
+@pytest.mark.long
 def test_glass_behind_a_surface_does_not_dim_it_nor_glass_behind_what_blocks_the_sun(device: Any) -> None:
     low, shelf = pane(-0.5), patch((-0.9, 0.8, 0.5), (0.6, 0, 0), (0, 0, -1.0))
     found = lit(device, glazed({"low": (low, "red"), "high": (pane(2.0), "clear"), "shelf": (shelf, "grey")}))
@@ -87,6 +88,7 @@ def test_glass_behind_a_surface_does_not_dim_it_nor_glass_behind_what_blocks_the
     assert (np.abs(share - 1) < 0.01).all(axis=-1).mean() > 0.5 and (found.max(axis=-1) < 0.01).sum() > 50
 
 
+@pytest.mark.long
 def test_edges_of_panes_are_sharp_and_lie_where_the_sun_draws_them(device: Any) -> None:
     found = lit(device, glazed({"pane": (pane(2.0, -0.6, 2.0), "red")}), frames=16)
     x = places(DOWN)[..., 0] - where(-0.6, 2.0)

@@ -179,6 +179,7 @@ def in_block(p: Floats, aside: float) -> bool:
     return bool(near.max() < far.min() and far.min() > 1e-3)
 
 
+@pytest.mark.long
 def test_facets_of_a_ball_are_lit_as_far_as_the_ball_is(device: Any) -> None:
     """Facets that turn away from the sun hide themselves; where a plate hides the sun, they stay dark."""
     radius, middle = 0.5, np.array([0.0, 0.55, 0.0])

@@ -126,6 +126,7 @@ def test_the_path_tracer_sees_the_interior(mi: Any) -> None:
     assert cube[windows].mean() > 10 * cube[opposite].mean()
 
 
+@pytest.mark.long
 def test_the_park_is_bright_and_dark_in_many_colours() -> None:
     image = lat_long_image("park")
     assert np.isfinite(image).all() and image.min() > 0 and image.max() > 1e5 * image.min()

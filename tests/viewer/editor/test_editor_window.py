@@ -41,6 +41,7 @@ def test_drag_undo_and_orbit(session):
     assert session.state()["camera"] == turned["camera"], "a click is no drag"
 
 
+@pytest.mark.long
 def test_a_long_path_is_typed_and_said_to_be_wrong(session):
     session.click(*session.point("##open", 0.5))
     session.tool("type", "/a/long/path/to/no/measurement.bsdf")
@@ -50,6 +51,7 @@ def test_a_long_path_is_typed_and_said_to_be_wrong(session):
     assert session.state()["editor"]["measured"]
 
 
+@pytest.mark.long
 def test_the_borders_move_and_the_window_resizes(session):
     before = session.state()["picture"]
     x, y = before[0] + 3, before[1] / 2

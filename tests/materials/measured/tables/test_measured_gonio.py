@@ -104,6 +104,7 @@ def test_it_is_exact_at_tuples_continuous_and_reciprocal(hemisphere):
     assert steps[1] < steps[0] / 5
 
 
+@pytest.mark.long
 def test_it_says_where_nothing_was_measured(hemisphere):
     table = table_of(TRUTHS["rough"], *scan(hemisphere, about_light_deg=35))
     light = direction(np.full(200, 0.8), 0.0)
@@ -343,6 +344,7 @@ FOIL = Material(
 CLEAN = {"noise": 0.0, "floor": 0.0}
 
 
+@pytest.mark.long
 def test_text_round_trip(tmp_path: Path) -> None:
     for material, setup in ((BRUSHED, ANISOTROPIC), (FOIL, ISOTROPIC)):
         table = synthesise(material, replace(setup, step_deg=10, fine_deg=5))

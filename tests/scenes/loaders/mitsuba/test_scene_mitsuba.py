@@ -76,6 +76,7 @@ def _quads(folder: Path) -> None:
     (folder / "quad.ply").write_text(head + "\n".join([*rows, "3 0 1 2", "3 0 2 3"]) + "\n")
 
 
+@pytest.mark.long
 def test_shapes_lie_where_mitsuba_has_them(tmp_path: Path) -> None:
     """Rays meet the same points, normals and texture coordinates (whose v is turned), whatever the shape."""
     _quads(tmp_path)
@@ -290,6 +291,7 @@ def test_old_names_defaults_includes_and_instances(tmp_path: Path) -> None:
     assert {p.name for p in scene.sources} == {"scene.xml", "materials.xml"}
 
 
+@pytest.mark.long
 def test_the_living_room(shared_data: Path) -> None:
     """A real interior of version 0.6 loads as it is."""
     scene = load_scene(shared_data / "scenes" / "living-room" / "scene.xml")

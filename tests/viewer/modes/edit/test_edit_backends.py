@@ -64,6 +64,7 @@ def window_of(device, state):
     return [pixels(device, texture).astype(int) for texture in drawing._textures]
 
 
+@pytest.mark.long
 def test_the_window_shows_the_same_from_the_cores_and_from_the_gpu(device, opened):
     """Drags, a switched curve, colours, an undo and a comparison, in every view transform."""
     states = [opened(OnHost(device)), opened(OnGpu(device))]
@@ -91,6 +92,7 @@ def test_the_window_shows_the_same_from_the_cores_and_from_the_gpu(device, opene
     assert np.allclose(gpu.radiance, host.radiance, rtol=2e-3, atol=1e-4)
 
 
+@pytest.mark.long
 def test_more_lights_fade_in_on_the_gpu_too(device, opened, monkeypatch):
     monkeypatch.setattr(painter, "FADE_S", 0.5)
     shown = []

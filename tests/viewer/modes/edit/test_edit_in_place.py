@@ -96,6 +96,7 @@ def test_a_view_that_is_not_edited_is_not_written(store):
     assert not (store / FILE).exists()
 
 
+@pytest.mark.long
 def test_views_share_the_rooms_materials(edited, store):
     edited.close()
     (store / "views.json").write_text(
@@ -212,6 +213,7 @@ def of_version_1(store, name, material, **edits):
     return said
 
 
+@pytest.mark.long
 def test_edits_of_version_1_become_the_rooms_as_a_step(store):
     of_version_1(store, "glaze", RED, tints={"diffuse": [0.5, 0.5, 0.5]})
     window = Window(store)

@@ -84,6 +84,7 @@ def exact(state, session=None, lights=LIGHTS[-1]):
     return picture.image().reshape(-1, 3)
 
 
+@pytest.mark.long
 def test_the_first_lights_can_be_edited_and_more_come_without_a_jump(opened):
     state, bakes = opened
     until(state, lambda: bakes.begun)

@@ -51,6 +51,7 @@ def test_a_scene_of_any_format_opens(tmp_path):
     assert subject.store == tmp_path / "thing.edit.store" and not subject.store.exists()
 
 
+@pytest.mark.long
 def test_cameras_are_chosen_by_name(tmp_path):
     box = type(tmp_path)("builtin:teatray")
     assert opened(box, Screen(tmp_path), camera="front").session.document.camera.name == "front"
@@ -72,6 +73,7 @@ def test_another_light_means_another_store(tmp_path, sky):
         opened(box, Screen(tmp_path), environment=tmp_path / "none.hdr")
 
 
+@pytest.mark.long
 def test_a_store_of_another_scene_is_left_alone(tmp_path):
     with Store.create(tmp_path / "mine", {}) as store:
         store.set_document("source", "builtin:box")
@@ -84,6 +86,7 @@ def test_a_store_of_another_scene_is_left_alone(tmp_path):
     )
 
 
+@pytest.mark.long
 def test_a_store_opens_under_the_light_that_it_was_baked_with(tmp_path, sky):
     with Store.create(tmp_path / "lit", {}) as store:
         store.set_document("source", "builtin:teatray")

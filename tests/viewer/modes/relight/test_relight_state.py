@@ -59,6 +59,7 @@ def test_every_turn_is_within_half_a_turn(opened, tray):
     assert state.edits.sky.turn_deg == -180.0
 
 
+@pytest.mark.long
 def test_a_drag_and_an_image_are_one_step_each(opened, tray, sky):
     state = opened(tray)
     before = settled(state)
@@ -170,6 +171,7 @@ def test_the_folder_of_something_else_is_left_alone(opened, gold_tray):
         Relit(gold_tray, state.edits.room, state.view).bake()
 
 
+@pytest.mark.long
 def test_a_damaged_store_of_edited_views_is_a_line(opened, gold_tray, bakes):
     copy = gold_tray.parent / COPY
     copy.mkdir()

@@ -189,6 +189,7 @@ def rated(drawing, meter, renderer, traced=None):
     return steps
 
 
+@pytest.mark.long
 def test_glare_is_drawn_face_by_face():
     meter, renderer = GlareMeter(wanted=True), Bright()
     drawing, frame = GlareDrawing(meter), FrameState(CAMERA, 320, 200)
@@ -207,6 +208,7 @@ def test_glare_is_drawn_face_by_face():
     assert meter.share == pytest.approx(1 / 5)
 
 
+@pytest.mark.long
 def test_glare_is_traced_or_drawn_but_not_mixed():
     meter, renderer, traced = GlareMeter(wanted=True), Bright(), Traced(9)
     drawing = GlareDrawing(meter)

@@ -113,6 +113,7 @@ def test_an_exchange_takes_one_frame_and_computes_nothing(pictures, state):
     np.testing.assert_array_equal(pictures.shown[0].read(), a)
 
 
+@pytest.mark.long
 def test_a_split_ends_other_comparisons_and_the_room_alone_comes_back(pictures, state):
     state.materials.edits.change("plaster", RED)
     state.states.split = True
@@ -122,6 +123,7 @@ def test_a_split_ends_other_comparisons_and_the_room_alone_comes_back(pictures, 
     assert len(pictures.shown) == 1 and pictures.divider is None
 
 
+@pytest.mark.long
 def test_films_have_the_light_and_the_textures_of_the_room(pictures, state, renderer):
     """Their renderer has light of its own where there are light groups."""
     edits = state.materials.edits

@@ -107,6 +107,7 @@ def z_of(b, reference):
     return tiles(got - mean) / np.sqrt(tiles(variance) * (1 + 64 / b.samples) / (8 * 24))
 
 
+@pytest.mark.long
 def test_the_picture_at_rest_is_traced_and_movement_draws_at_once(pictures, state, store):
     drawn(pictures, state, SIZE)
     a = pictures.shown[0]
@@ -259,6 +260,7 @@ def test_turned_off_the_picture_at_rest_is_drawn(pictures, state):
     until(pictures, state, SIZE, lambda: pictures.wait_s() is None)  # light may still be mixed
 
 
+@pytest.mark.long
 def test_b_is_the_path_traced_scene_beside_the_picture_at_rest(pictures, state, store):
     """Against the reference by z; at rest only, and A stands in until there is something."""
     state.comparison.mode, state.comparison.integrator = "side by side", "path"

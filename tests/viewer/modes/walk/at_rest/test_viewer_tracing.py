@@ -130,6 +130,7 @@ def test_a_process_that_is_killed_while_it_writes_is_a_line(monkeypatch):
     tracing.close()
 
 
+@pytest.mark.long
 def test_a_store_without_a_scene_is_a_line(adapter, screen, tmp_path):
     """And the drawn picture stays."""
     folder = write_small_store(tmp_path / "small.store")

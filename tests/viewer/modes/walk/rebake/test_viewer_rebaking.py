@@ -236,6 +236,7 @@ def test_light_of_an_edit_that_was_given_up_is_not_shown(boxes, opened, store, t
     np.testing.assert_allclose(image(room.renderer, state), image(truth, state), rtol=2e-3, atol=1e-4)
 
 
+@pytest.mark.long
 def test_without_answers_an_edit_goes_from_as_baked_to_exact_and_back(room):
     state, edits = room.state, room.state.materials.edits
     state.answering.on = False

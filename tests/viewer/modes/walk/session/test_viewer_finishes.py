@@ -78,6 +78,7 @@ def test_a_folder_that_is_gone_is_said(finishes, screen):
     assert len(finishes.all) == 2 and "are not shown" in screen.messages[-1].text
 
 
+@pytest.mark.long
 def test_a_sphere_looks_like_its_material():
     matte, black = ball(Material(name="red", kd=(0.8, 0.1, 0.1))), ball(Material(name="black", kd=0))
     middle = BALL_SIDE // 2

@@ -66,6 +66,7 @@ def test_who_stands_too_near_may_step_away():
     assert np.linalg.norm(ROOM.allowed(near, -away, 1.6)) < 1e-6
 
 
+@pytest.mark.long
 @settings(max_examples=40)
 @given(st.floats(-4, 4), st.floats(-1.5, 3), st.floats(0, 2 * math.pi))
 def test_nobody_gets_through_the_wall(x, z, heading):
