@@ -148,7 +148,8 @@ OWN_FILES = {
     "realtime/gpu/shader_source.py: _path(name).read_text": "the package's shader",
     "bench/measuring/switches.py: path.read_text": "the package's shader",
     "bench/measuring/switches.py: Path(module.__file__).read_text": "the package's source",
-    "site/stills.py: (page / 'index.html').read_text": "the package's page",
+    "site/replacing.py: file.read_bytes": "the package's page",
+    "site/stills.py: files('lambent.site').joinpath('stills_page/index.html').read_text": "the package's page",
     "viewer/modes/walk/comparison.py: np.load": "what its own worker wrote",
     "viewer/modes/walk/comparison.py: words.read_text": "what its own worker wrote",
 }
