@@ -15,7 +15,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 from lambent.core.errors import UserError
-from lambent.core.files import atomic_path
+from lambent.core.files import atomic_path, write_text
 from lambent.core.inputs import read_head
 from lambent.core.outputs import check_new_folder
 
@@ -49,8 +49,7 @@ def replacing(folder: Path, form: str, parts: Iterable[str]) -> Iterator[Replace
     """
     if not (folder / MANIFEST).is_file():
         mark = json.dumps({"format": form, "version": UNFINISHED}, separators=(",", ":"))
-        with atomic_path(folder / MANIFEST) as beside:
-            beside.write_text(mark)
+        write_text(folder / MANIFEST, mark)
     former = set(_names(folder, parts))
     with ExitStack() as renames:
         one = Replacement(folder, renames)

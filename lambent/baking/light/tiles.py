@@ -46,8 +46,8 @@ class Stage:
 
     def parts(self, traced: TracedScene) -> int:
         """Number of stored parts of the light."""
-        groups = len(traced.sorted_lights.groups) if self.by_group else 0
-        return groups * (1 + (self.direct is not None)) if self.by_group else int(self.direct is not None)
+        direct = int(self.direct is not None)
+        return len(traced.sorted_lights.groups) * (1 + direct) if self.by_group else direct
 
     def sampling(self, traced: TracedScene) -> Sampling:
         """The sampling of `traced.whole(diffuse=self.diffuse)`."""
