@@ -1,6 +1,7 @@
 """The picture at rest, and B of a comparison, traced in a process of its own and shown as frames are."""
 
 import time
+from collections import deque
 from dataclasses import replace
 
 import numpy as np
@@ -129,8 +130,21 @@ def test_the_picture_at_rest_is_traced_and_movement_draws_at_once(pictures, stat
     assert np.abs(tiles(again.read()) - tiles(mean)).max() > 0.1 * mean.mean(), "another view"
 
 
-def test_a_coarse_picture_is_replaced_by_a_traced_one_of_half_size_first(pictures, state):
+class OneEachFrame(deque):
+    """Reports of the process, of which each frame takes one: on a busy machine several arrive between two frames."""
+
+    taken = False
+
+    def __bool__(self):
+        self.taken = len(self) > 0 and not self.taken
+        return self.taken
+
+
+def test_a_coarse_picture_is_replaced_by_a_traced_one_of_half_size_first(pictures, state, monkeypatch):
     """Which is no picture to measure or save."""
+    until(pictures, state, SIZE, lambda: pictures._at_rest.ready)  # before, the picture at rest is drawn whole
+    monkeypatch.setattr(pictures._at_rest._tracing, "_reports", OneEachFrame())
+    state.navigation.camera = replace(state.navigation.camera, fov_y_deg=39.0)
     state.screen.pace.adaptive = True
     for size in pictures._a.pacer._sizes.values():
         size.scale = 0.5
