@@ -5,15 +5,17 @@ mixed by Wiener's rule, in proportion to the part of their squared difference th
 the light nearby: otherwise a bright neighbour would decide for a dark gap, and a dark room beside a bright one would
 have no detail.
 
-Two halves know the noise of rare bright paths badly: in a few of many texels such a path arrives in both.
-The mean square therefore counts as far as it exceeds its own standard error: not at all where one texel makes it, fully
-where four do.
+Two halves know the noise of rare bright paths badly: in a few of many texels such a path arrives in both, and where
+none arrives, samples agree on darkness. The mean square therefore counts as far as it exceeds its own standard error:
+not at all where one texel makes it, fully where four do. And noise is at least what it is in a wider region, in
+proportion to the light.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from lambent.baking.light.level import REACH
 from lambent.baking.light.noise import chart_means
 from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.light.colour import luminance
@@ -39,9 +41,12 @@ def with_detail(clean: Floats, noisy: Floats, variance: Floats, known: Flags, la
     squared = np.maximum(np.maximum(light, DARK * nearby), 1e-12) ** 2  # the least: black texels
     difference = luminance(np.asarray(noisy, np.float32)) - light
     square = difference**2 / squared
-    parts = np.stack([square, square**2, np.asarray(variance, np.float32) / squared], axis=-1)
+    widely = chart_means(np.stack([variance, light], axis=-1).astype(np.float32), known, labels, REACH)[0]
+    in_proportion = light * widely[..., 0] / np.maximum(widely[..., 1], 1e-20)
+    parts = np.stack([square, square**2, variance / squared, in_proportion / squared], axis=-1)
     means, count = chart_means(parts.astype(np.float32), known, labels)
-    found, fourth, expected = np.moveaxis(means, -1, 0)
+    found, fourth, *noise = np.moveaxis(means, -1, 0)
+    expected = np.maximum(*noise)
     error = np.sqrt(fourth / np.maximum(count, 1))
     trust = np.clip(1 - DOUBT * expected / np.maximum(found, 1e-12), 0, 1) * known
     trust *= np.clip(found / np.maximum(error, 1e-12) - 1, 0, 1)

@@ -1,11 +1,16 @@
-"""Level correction: regions of a denoised light map keep the light of their samples.
+"""Level correction: a denoised light map keeps the light of its samples, as a whole, in its charts and in its regions.
 
 Samples of a room lit through windows are skewed: many are dark, few very bright. The denoiser treats some bright ones
-as outliers, and darkens a region the more, the noisier it is. Sums over hundreds of texels have little noise, so each
-texel is scaled by the quotient of two sums around it: of samples, and of denoised light.
+as outliers, and darkens a region the more, the noisier it is. Sums over hundreds of texels have little noise, so light
+is scaled by quotients of two sums: of samples, and of denoised light.
 
-In a small chart the quotient is still noisy. It is shrunk towards 1 by the share of noise in its variance: the
-posterior mean for normally distributed quotients.
+Sums over few texels are noisy all the same. Quotients are shrunk towards 1 by the share of noise in their variance: the
+posterior mean for normally distributed quotients. Rare bright paths may leave a region noisy that the denoiser has
+darkened to a fifth, so the whole map is scaled first, then its charts, then the regions: each corrects what is left.
+
+The noise of a sum follows from the light: the same rare paths that bring it make its variance, as for Poisson's
+numbers, in one ratio for the map. The differences of the samples would not do. Where rare paths have found nothing,
+samples agree on darkness.
 """
 
 from __future__ import annotations
@@ -30,13 +35,36 @@ def with_level(clean: Floats, noisy: Floats, known: Flags, labels: Indices) -> F
     labels : (H, W) int
         Chart of each texel, -1 in gutters, which are unchanged.
     """
-    denoised, sampled = (luminance(np.asarray(light, np.float32)) for light in (clean, noisy))
-    parts = np.stack([sampled, denoised, (sampled - denoised) ** 2], axis=-1)
-    means, count = chart_means(parts, known, labels, REACH)
-    of_samples, of_clean, square = np.moveaxis(means, -1, 0)
-    lit = (labels >= 0) & (of_clean > 0) & (count > 0)
-    quotient = np.divide(of_samples, of_clean, out=np.ones_like(of_clean), where=lit)
-    variance = np.divide(square, of_clean**2 * count, out=np.full_like(of_clean, np.inf), where=lit)
-    trust = SPREAD**2 / (SPREAD**2 + variance)
-    scale = np.where(lit, 1 + trust * (quotient - 1), 1.0)
+    within, counted = labels >= 0, known & (labels >= 0)
+    sampled, light = (luminance(np.asarray(one, np.float64)) for one in (noisy, clean))
+    scale = np.ones(light.shape)
+    for sums_of in (_sums_of_map, _sums_of_charts, _sums_of_regions):
+        shown = light * scale
+        of_samples, of_light = sums_of(np.stack([sampled, shown], axis=-1), counted, labels)
+        total = shown[counted].sum()
+        ratio = ((sampled - shown)[counted] ** 2).sum() / total if total > 0 else 0.0
+        lit = within & (of_light > 0)
+        quotient = np.divide(of_samples, of_light, out=np.ones_like(light), where=lit)
+        variance = np.divide(ratio, of_light, out=np.full_like(light, np.inf), where=lit)
+        scale = np.where(lit, scale * (1 + SPREAD**2 / (SPREAD**2 + variance) * (quotient - 1)), scale)
     return np.asarray(clean * scale[..., None], clean.dtype)
+
+
+def _sums_of_map(values: Floats, counted: Flags, labels: Indices) -> tuple[Floats, Floats]:
+    """Sums of two channels (H, W, 2) over the map, at each texel (H, W)."""
+    one, other = (np.full(labels.shape, values[counted, channel].sum()) for channel in (0, 1))
+    return one, other
+
+
+def _sums_of_charts(values: Floats, counted: Flags, labels: Indices) -> tuple[Floats, Floats]:
+    """Likewise over the charts."""
+    numbers, chart = np.unique(labels, return_inverse=True)  # labels of hidden texels are large
+    chart = chart.reshape(labels.shape)
+    one, other = (np.bincount(chart[counted], values[counted, c], len(numbers))[chart] for c in (0, 1))
+    return one, other
+
+
+def _sums_of_regions(values: Floats, counted: Flags, labels: Indices) -> tuple[Floats, Floats]:
+    """Likewise over the texels of the same chart within REACH."""
+    means, count = chart_means(values.astype(np.float32), counted, labels, REACH)
+    return means[..., 0] * count, means[..., 1] * count

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from lambent.baking.light.denoise import denoise_charts
+from lambent.baking.light.detail import with_detail
 from lambent.baking.light.level import with_level
+from lambent.baking.light.sampling import variance_of
 from lambent.core.arrays import Flags, Floats, Indices
 
 
@@ -55,3 +57,16 @@ def test_a_chart_without_light_stays_black() -> None:
     light = np.where(labels == 1, 1.0, 0.0)[..., None] * np.ones(3)
     kept = with_level(light, light, known, labels)
     assert np.allclose(kept, light)
+
+
+def test_light_that_one_texel_in_two_hundred_finds_is_not_lost() -> None:
+    """The denoiser takes most of it for outliers, and texels that found nothing agree on darkness."""
+    known, labels = charts()
+    rng = np.random.default_rng(1)
+    found = (rng.random((2, *labels.shape)) < 0.0025) * known
+    halves = np.broadcast_to((400.0 * found)[..., None], (*found.shape, 3))
+    noisy, clean = halves.mean(axis=0), denoise_charts(halves.mean(axis=0), known, labels, smooth=8)
+    kept = with_detail(with_level(clean, noisy, known, labels), noisy, variance_of(halves), known, labels)
+    assert clean[known].mean() < 0.7 * noisy[known].mean()
+    assert abs(kept[known].mean() / noisy[known].mean() - 1) < 0.1
+    assert np.median(kept[known]) > 0.1, "not in those texels alone"
