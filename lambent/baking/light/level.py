@@ -1,19 +1,22 @@
-"""Level correction: a denoised light map keeps the light of its samples, as a whole, in its charts and in its regions.
+"""Level correction: regions of a denoised light map keep the light of their samples.
 
 Samples of a room lit through windows are skewed: many are dark, few very bright. The denoiser treats some bright ones
-as outliers, and darkens a region the more, the noisier it is. Sums over hundreds of texels have little noise, so light
-is scaled by quotients of two sums: of samples, and of denoised light.
+as outliers, and darkens a region the more, the noisier it is. Sums over hundreds of texels have little noise, so each
+texel is scaled by the quotient of two sums around it: of samples, and of denoised light.
 
-Sums over few texels are noisy all the same. Quotients are shrunk towards 1 by the share of noise in their variance: the
-posterior mean for normally distributed quotients. Rare bright paths may leave a region noisy that the denoiser has
-darkened to a fifth, so the whole map is scaled first, then its charts, then the regions: each corrects what is left.
+Where few paths find the light, or charts are small, the quotient is still noisy. It is shrunk by the share of noise in
+its variance: the posterior mean for normally distributed quotients. It shrinks towards the quotient of all that is as
+noisy in its chart, since the denoiser may have darkened that to a fifth. Charts are not scaled together: three lucky
+paths at a candle would brighten the walls.
 
-The noise of a sum follows from the light: the same rare paths that bring it make its variance, as for Poisson's
-numbers, in one ratio for the map. The differences of the samples would not do. Where rare paths have found nothing,
-samples agree on darkness.
+The paths that bring light make its variance, as for Poisson's numbers: the variance of a sum is in proportion to its
+light, by the light of one path, which is that of the chart, or of the map where few have arrived. A region's own
+samples would not do: where none has arrived they agree on darkness, as if they had no noise.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -22,10 +25,11 @@ from lambent.core.arrays import Flags, Floats, Indices
 from lambent.core.light.colour import luminance
 
 REACH = 12  # texels to each side: 25 x 25
-SPREAD = 0.3  # standard deviation of true quotients about 1
+SPREAD = 0.3  # standard deviation of true quotients about their mean
+FEW = 4.0  # paths: of so many the variance is unknown, of twice as many it is known
 
 
-def with_level(clean: Floats, noisy: Floats, known: Flags, labels: Indices) -> Floats:
+def with_level(clean: Floats, noisy: Floats, known: Flags, labels: Indices, variance: Floats | None = None) -> Floats:
     """Scale denoised light (H, W, 3) to the level of its samples `noisy` (H, W, 3), by luminance.
 
     Parameters
@@ -34,37 +38,43 @@ def with_level(clean: Floats, noisy: Floats, known: Flags, labels: Indices) -> F
         Sampled texels.
     labels : (H, W) int
         Chart of each texel, -1 in gutters, which are unchanged.
+    variance : (H, W), optional
+        Squared standard error of the luminance of `noisy`, or more. Otherwise all that the denoiser changes is noise.
     """
-    within, counted = labels >= 0, known & (labels >= 0)
-    sampled, light = (luminance(np.asarray(one, np.float64)) for one in (noisy, clean))
-    scale = np.ones(light.shape)
-    for sums_of in (_sums_of_map, _sums_of_charts, _sums_of_regions):
-        shown = light * scale
-        of_samples, of_light = sums_of(np.stack([sampled, shown], axis=-1), counted, labels)
-        total = shown[counted].sum()
-        ratio = ((sampled - shown)[counted] ** 2).sum() / total if total > 0 else 0.0
-        lit = within & (of_light > 0)
-        quotient = np.divide(of_samples, of_light, out=np.ones_like(light), where=lit)
-        variance = np.divide(ratio, of_light, out=np.full_like(light, np.inf), where=lit)
-        scale = np.where(lit, scale * (1 + SPREAD**2 / (SPREAD**2 + variance) * (quotient - 1)), scale)
+    light, sampled = (luminance(np.asarray(one, np.float64)) for one in (clean, noisy))
+    noise = (sampled - light) ** 2 if variance is None else np.asarray(variance, np.float64)
+    counted = known & (labels >= 0)
+    _, chart = np.unique(labels, return_inverse=True)
+    groups = np.zeros(labels.shape, int), chart.reshape(labels.shape)
+
+    def sums(group: Indices, *values: Floats) -> list[Any]:
+        """Sums over each group at its texels (H, W)."""
+        return [np.bincount(group.reshape(-1), (counted * one).reshape(-1))[group] for one in values]
+
+    of_path = np.zeros(light.shape)
+    for group in groups:
+        of_samples, of_noise = sums(group, sampled, noise)
+        paths = _share(of_samples**2, of_noise, np.where(of_samples > 0, np.inf, 0.0))
+        of_path += np.clip(paths / FEW - 1, 0, 1) * (_share(of_noise, of_samples, 0.0) - of_path)
+
+    both = np.stack([sampled, light], axis=-1).astype(np.float32)
+    means, count = chart_means(both, counted, labels, REACH)
+    of_samples, of_light = np.moveaxis(means.astype(float) * count[..., None], -1, 0)
+    quotient, trust = _share(of_samples, of_light, 1.0), _trust(of_path, of_light)
+    doubted = (1 - trust) * light
+    of_samples, of_noise, of_light = sums(groups[1], doubted * quotient, doubted * of_path, doubted)
+    mean = 1 + _trust(_share(of_noise, of_light, 0.0), of_light) * (_share(of_samples, of_light, 1.0) - 1)
+    scale = np.where(labels >= 0, mean + trust * (quotient - mean), 1.0)
     return np.asarray(clean * scale[..., None], clean.dtype)
 
 
-def _sums_of_map(values: Floats, counted: Flags, labels: Indices) -> tuple[Floats, Floats]:
-    """Sums of two channels (H, W, 2) over the map, at each texel (H, W)."""
-    one, other = (np.full(labels.shape, values[counted, channel].sum()) for channel in (0, 1))
-    return one, other
+def _share(part: Any, whole: Any, otherwise: Any) -> Floats:
+    """Quotients, or `otherwise` of nothing."""
+    return np.asarray(
+        np.divide(part, whole, out=np.full(np.shape(whole), otherwise, float), where=np.greater(whole, 0))
+    )
 
 
-def _sums_of_charts(values: Floats, counted: Flags, labels: Indices) -> tuple[Floats, Floats]:
-    """Likewise over the charts."""
-    numbers, chart = np.unique(labels, return_inverse=True)  # labels of hidden texels are large
-    chart = chart.reshape(labels.shape)
-    one, other = (np.bincount(chart[counted], values[counted, c], len(numbers))[chart] for c in (0, 1))
-    return one, other
-
-
-def _sums_of_regions(values: Floats, counted: Flags, labels: Indices) -> tuple[Floats, Floats]:
-    """Likewise over the texels of the same chart within REACH."""
-    means, count = chart_means(values.astype(np.float32), counted, labels, REACH)
-    return means[..., 0] * count, means[..., 1] * count
+def _trust(ratio: Floats, light: Floats) -> Floats:
+    """Trust in quotients of sums of so much light, whose variance is `ratio` times that."""
+    return np.asarray(SPREAD**2 / (SPREAD**2 + _share(ratio, light, np.inf)))

@@ -223,7 +223,7 @@ def denoised(irradiance: Floats, known: Flags, labels: Indices, variance: Floats
 
     With the `variance` (H, W) of its luminance, detail that the filter loses is kept.
     """
-    clean = with_level(denoise_charts(irradiance, known, labels, smooth=SMOOTH), irradiance, known, labels)
+    clean = with_level(denoise_charts(irradiance, known, labels, smooth=SMOOTH), irradiance, known, labels, variance)
     return clean if variance is None else with_detail(clean, irradiance, variance, known, labels)
 
 
