@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -45,6 +45,14 @@ class GatherPoints:
         return GatherPoints(side, texel, block)
 
 
+def in_few_charts(spots: Spots) -> Spots:
+    """Spots of which each chart can have a point: in place of too many charts come the objects, or one for all."""
+    for chart in (spots.chart, spots.object, np.zeros_like(spots.object)):
+        if sum(len(np.unique(chart[lit])) for lit in spots.lit) <= MOST_POINTS:
+            break
+    return replace(spots, chart=chart)
+
+
 def gather_points(spots: Spots, width: int, block: int) -> GatherPoints:
     """One lit texel of each block x block texels, chart and side: the one nearest to the block's middle."""
     lit = [np.flatnonzero(spots.lit[side]) for side in range(2)]
@@ -65,7 +73,7 @@ def bounded_points(spots: Spots, width: int, block: int, patches: int) -> Gather
     """`gather_points` of blocks of such a size, or another.
 
     Blocks are smaller in small maps, where there would be fewer than POINTS_OF_PATCH points for each of so many
-    patches, and larger where rays could not name all points.
+    patches, and larger where rays could not name all points. Spots are those of `in_few_charts`.
     """
     found = gather_points(spots, width, block)
     while len(found.texel) < POINTS_OF_PATCH * patches and block > 1:
@@ -181,9 +189,11 @@ def neighbours(spots: Spots, points: GatherPoints) -> tuple[NDArray[np.uint32], 
     codes, near, shares = [], [], []
     point_owner = owner[points.texel] + points.side
     for side in range(2):
-        for one in np.unique(point_owner[points.side == side]):
-            mine = np.flatnonzero(spots.there[side] & (owner + side == one))
-            known = np.flatnonzero(point_owner == one)
+        there = np.flatnonzero(spots.there[side])
+        owners = np.unique(point_owner[points.side == side])
+        texels_of, points_of = _by_number(owner[there] + side, owners), _by_number(point_owner, owners)
+        for mine, known in zip(texels_of, points_of, strict=True):
+            mine = there[mine]
             count = min(NEAR, len(known))
             query = np.arange(1, count + 1)
             found = np.tile(KDTree(place[points.texel[known]]).query(place[mine], k=query)[1], 2)
@@ -208,6 +218,13 @@ def neighbours(spots: Spots, points: GatherPoints) -> tuple[NDArray[np.uint32], 
     order = np.argsort(code)
     packed = Neighbours(nearest[order].astype(np.uint32), share[order].astype(np.uint8))
     return code[order].astype(np.uint32), packed
+
+
+def _by_number(numbers: Indices, wanted: Indices) -> list[Indices]:
+    """Places of each wanted number, in ascending order."""
+    order = np.argsort(numbers, kind="stable")
+    first, end = (np.searchsorted(numbers[order], wanted, side=side) for side in ("left", "right"))
+    return [order[a:b] for a, b in zip(first, end, strict=True)]
 
 
 def points_near(spots: Spots, codes: NDArray[np.uint32], near: Neighbours) -> Indices:

@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lambent.baked.answering.rays import BYTE, Rays, packed_rays
+from lambent.baked.answering.rays import BYTE, MOST_POINTS, Rays, packed_rays
 from lambent.baking.answering.patches import clustered
 from lambent.baking.answering.points import (
     MORE,
     MORE_RECEIVERS,
     GatherPoints,
+    bounded_points,
     gather_points,
+    in_few_charts,
     neighbours,
     receiving_points,
     refined_points,
@@ -71,6 +73,22 @@ def test_points_are_dense_along_a_contact_and_as_many_as_allowed() -> None:
     assert np.array_equal(far.texel, coarse.texel), "in the open nothing changes"
     finest = gather_points(spots, SIZE, 1)
     assert refined_points(spots, SIZE, finest, np.full(len(finest.texel), 0.1)) is finest
+
+
+def test_more_charts_than_points_have_names_share_theirs_by_object() -> None:
+    side = 384  # a chart for each texel
+    row, column = np.divmod(np.arange(side * side), side)
+    lit, one = np.ones((2, side * side), bool), np.zeros((1, 1, 1, 3), np.float32)
+    position, objects = np.stack([column, 0 * row, row], axis=-1).astype(float), row // 96
+    up, every = np.tile([0.0, 1.0, 0.0], (side * side, 1)), np.arange(side * side)
+    spots = Spots(lit, lit, one, one, one[0], np.ones(side * side), objects, objects, every, position, up, every)
+    few = in_few_charts(spots)
+    found = bounded_points(few, side, 1, 1000)
+    assert len(found.texel) <= MOST_POINTS and set(few.chart.tolist()) == {0, 1, 2, 3}
+    codes, _ = neighbours(few, found)
+    assert len(codes) == 2 * side * side, "every texel answers"
+    many = replace(spots, object=every)
+    assert not in_few_charts(many).chart.any() and len(bounded_points(in_few_charts(many), side, 1, 1000).texel) > 1000
 
 
 def test_texels_show_their_own_point_where_each_has_one() -> None:
