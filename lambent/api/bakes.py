@@ -129,7 +129,7 @@ def bake(
         if INTERREFLECTION in (only or ()):
             what, bounces = request.continued_or_proposed(folder, wanted, note or (lambda text: None), bar)
             watch = request.watch(what, folder, bounces, bar)
-        with _workers(on) as workers:
+        with _workers(on, bar) as workers:
             store = baked(
                 what, folder, quality=quality, only=only, resume=resume, seed=seed, light_map=light_map, probes=probes,
                 light_groups=light_groups, light_fields=light_fields, light_field_mb=light_field_mb, bounces=bounces,
@@ -294,12 +294,12 @@ def _check_lit(scene: Contents) -> None:
 
 
 @contextmanager
-def _workers(on: int | str | None) -> Iterator[Workers | None]:
+def _workers(on: int | str | None, progress: Progress) -> Iterator[Workers | None]:
     """The workers that trace; None: this process."""
     if on is None:
         yield None
         return
     from lambent.baking.running.cluster import opened
 
-    with opened(on) as workers:
+    with opened(on, progress) as workers:
         yield workers

@@ -23,10 +23,11 @@ def command(
 
     Example: lambent serve site
     """
+    from lambent.site.replacing import is_unfinished
     from lambent.site.serving import SiteServer
 
     with ExitStack() as stack:
-        if (site / "manifest.json").is_file() and not (site / "index.html").is_file():
+        if (site / "manifest.json").is_file() and not (site / "index.html").is_file() and not is_unfinished(site):
             from lambent.api.sites import export
 
             store, site = site, Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="lambent-site-")))

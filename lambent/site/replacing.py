@@ -19,7 +19,8 @@ from lambent.core.files import atomic_path, write_text
 from lambent.core.inputs import read_head
 from lambent.core.outputs import check_new_folder
 
-MANIFEST, UNFINISHED = "manifest.json", 0  # a version
+MANIFEST = "manifest.json"
+UNFINISHED = '"version":0}'  # how the manifest of a new export ends until the rest of it is there
 
 
 class Replacement:
@@ -48,8 +49,7 @@ def replacing(folder: Path, form: str, parts: Iterable[str]) -> Iterator[Replace
     If the block raises, the former export stays, or a new folder is said to hold an unfinished one.
     """
     if not (folder / MANIFEST).is_file():
-        mark = json.dumps({"format": form, "version": UNFINISHED}, separators=(",", ":"))
-        write_text(folder / MANIFEST, mark)
+        write_text(folder / MANIFEST, f'{{"format":{json.dumps(form)},{UNFINISHED}')
     former = set(_names(folder, parts))
     with ExitStack() as renames:
         one = Replacement(folder, renames)
@@ -59,6 +59,11 @@ def replacing(folder: Path, form: str, parts: Iterable[str]) -> Iterator[Replace
             _remove(folder, set(_names(folder, parts)) - former)
             raise
     _remove(folder, set(_names(folder, parts)) - one.named)
+
+
+def is_unfinished(folder: Path) -> bool:
+    """Whether a folder holds an export that did not come to its end."""
+    return (folder / MANIFEST).is_file() and read_head(folder / MANIFEST, 128).endswith(UNFINISHED.encode())
 
 
 def check_folder(folder: Path, form: str, what: str) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 
 from lambent.core.errors import UserError
 from lambent.core.inputs import read_bytes
+from lambent.site.replacing import is_unfinished
 
 TYPES = {
     ".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=utf-8", ".css": "text/css; charset=utf-8",
@@ -33,7 +34,8 @@ class SiteServer(ThreadingHTTPServer):
     def __init__(self, folder: Path, host: str = "127.0.0.1", port: int = 0) -> None:
         """Port 0: any free one. Raises `UserError` if the folder is no site or the port is taken."""
         if not (folder / "manifest.json").is_file() or not (folder / "index.html").is_file():
-            raise UserError("is no site", file=folder, hint="make one: lambent export STORE -o SITE")
+            what = "holds an export that did not come to its end" if is_unfinished(folder) else "is no site"
+            raise UserError(what, file=folder, hint="make one: lambent export STORE -o SITE")
         self.folder, self.is_local = folder.resolve(), host in LOOPBACK
         try:
             super().__init__((host, port), partial(_Handler, directory=str(self.folder)))

@@ -10,6 +10,7 @@ import threading
 import pytest
 
 from lambent.core.errors import UserError
+from lambent.site.replacing import replacing
 from lambent.site.serving import SiteServer
 
 
@@ -94,6 +95,10 @@ def test_no_other_site_may_read(ask):
 
 def test_what_cannot_be_served_is_said(tmp_path, site):
     with pytest.raises(UserError, match=r"is no site; make one: lambent export"):
+        SiteServer(tmp_path)
+    with pytest.raises(KeyboardInterrupt), replacing(tmp_path, "lambent site", ()):
+        raise KeyboardInterrupt
+    with pytest.raises(UserError, match=r"holds an export that did not come to its end; make one: lambent export"):
         SiteServer(tmp_path)
     with SiteServer(site) as server, pytest.raises(UserError, match="cannot be served there"):
         SiteServer(site, port=server.server_address[1])

@@ -26,6 +26,7 @@ from typing import Any, TypeVar
 
 from lambent.baking.engine import engine, set_threads
 from lambent.core.errors import UserError
+from lambent.core.progress import Progress, silent
 
 J = TypeVar("J")
 R = TypeVar("R")
@@ -36,7 +37,7 @@ _one_at_a_time = threading.Lock()  # a job uses all threads of its process
 
 
 @contextmanager
-def opened(on: int | str) -> Iterator[DaskWorkers]:
+def opened(on: int | str, progress: Progress = silent) -> Iterator[DaskWorkers]:
     """That many new processes of this machine, or the workers of the cluster at an address, which outlive this context.
 
     New processes start Python afresh: a script needs `if __name__ == "__main__":`.
@@ -63,12 +64,14 @@ def opened(on: int | str) -> Iterator[DaskWorkers]:
                     memory_limit=0, local_directory=folder,
                 )  # fmt: skip
             address = stack.enter_context(local).scheduler_address
+        progress(0, 1, f"connecting to {address}")
         try:
             asyncio.run(_connect(address))
             client = stack.enter_context(distributed.Client(address, timeout=SECONDS))
         except (OSError, TimeoutError, ValueError) as error:
             expected, hint = "a number of processes, or tcp://HOST:PORT", "start a scheduler with `dask scheduler`"
             raise UserError("no scheduler answered", field="--on", got=address, expected=expected, hint=hint) from error
+        progress(0, 1, "waiting for a worker")
         try:
             client.wait_for_workers(1, timeout=SECONDS)
         except TimeoutError as error:
