@@ -8,7 +8,7 @@ have no detail.
 Two halves know the noise of rare bright paths badly: in a few of many texels such a path arrives in both, and where
 none arrives, samples agree on darkness. The mean square therefore counts as far as it exceeds its own standard error:
 not at all where one texel makes it, fully where four do. And noise is at least that of the mean of the texels nearby,
-if each of the paths that light should consist of brings as much as in a wider region.
+if their relative noise is that of a wider region.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ def with_detail(clean: Floats, noisy: Floats, variance: Floats, known: Flags, la
     squared = np.maximum(np.maximum(light, DARK * nearby), 1e-12) ** 2  # the least: black texels
     difference = luminance(np.asarray(noisy, np.float32)) - light
     square = difference**2 / squared
-    widely = chart_means(np.stack([variance, light], axis=-1).astype(np.float32), known, labels, REACH)[0]
-    of_path = widely[..., 0] / np.maximum(widely[..., 1], 1e-20)
-    parts = np.stack([square, square**2, variance / squared, of_path * light / squared], axis=-1)
+    noise = np.asarray(variance / squared, np.float32)
+    widely = chart_means(noise[..., None], known, labels, REACH)[0][..., 0]
+    parts = np.stack([square, square**2, noise], axis=-1)
     means, count = chart_means(parts.astype(np.float32), known, labels)
-    found, fourth, of_halves, in_proportion = np.moveaxis(means, -1, 0)
-    expected = np.maximum(DOUBT * of_halves, in_proportion / np.maximum(count, 1))
+    found, fourth, of_halves = np.moveaxis(means, -1, 0)
+    expected = np.maximum(DOUBT * of_halves, widely / np.maximum(count, 1))
     error = np.sqrt(fourth / np.maximum(count, 1))
     trust = np.clip(1 - expected / np.maximum(found, 1e-12), 0, 1) * known
     trust *= np.clip(found / np.maximum(error, 1e-12) - 1, 0, 1)

@@ -34,6 +34,13 @@ def test_a_gap_in_the_dark_is_found_beside_a_thousand_times_the_light() -> None:
     assert found[:24, 21:24].mean() < 0.06e-3 and found[24:, 21:24].mean() < 0.06
 
 
+def test_what_the_filter_carries_from_daylight_into_a_dark_room_is_removed() -> None:
+    light, filtered = np.full((48, 48), 100.0), np.full((48, 48, 3), 100.0)
+    light[:, :24], filtered[:, :24] = 0.0, 0.02
+    found = with_detail(filtered, *sampled(light, 1), KNOWN, LABELS)
+    assert found[:, :22].max() < 0.002
+
+
 def test_noise_stays_out() -> None:
     light = np.ones((48, 48))
     noisy, variance = sampled(light, 2)
