@@ -28,7 +28,8 @@ from lambent.core.files import write_text
 
 T = TypeVar("T")
 LLVM_OLDEST = 19  # Dr.Jit refuses 14 and aborts with 15 to 18
-# Dr.Jit's threads flush denormal numbers to zero. A single one is the caller's, which keeps them: other bits.
+# Dr.Jit's threads flush denormal numbers to zero. A single one is the caller's, which keeps them: other bits. So may be
+# what one block of work computes, if nothing waits before it.
 LEAST_THREADS = 2
 LIBRARY_VARIABLE = "DRJIT_LIBLLVM_PATH"
 VARIANT_VARIABLE = "LAMBENT_VARIANT"

@@ -41,7 +41,7 @@ def with_detail(clean: Floats, noisy: Floats, variance: Floats, known: Flags, la
     squared = np.maximum(np.maximum(light, DARK * nearby), 1e-12) ** 2  # the least: black texels
     difference = luminance(np.asarray(noisy, np.float32)) - light
     square = difference**2 / squared
-    noise = np.asarray(variance / squared, np.float32)
+    noise = np.minimum(variance / squared, 1e12).astype(np.float32)  # above, quotients overflow
     widely = chart_means(noise[..., None], known, labels, REACH)[0][..., 0]
     parts = np.stack([square, square**2, noise], axis=-1)
     means, count = chart_means(parts.astype(np.float32), known, labels)
