@@ -83,7 +83,8 @@ def scene_of(store: Store, file: str | None = None) -> Scene:
         objects = (replace(o, material=names.get(o.name, o.material)) for o in scene.objects)
         return replace(scene, objects=tuple(objects), materials={**scene.materials, **record.materials})
     cuts = set(store.documents.get(CUTS, {}).get("objects", ()))
-    baked = {o.name: _parts_of(o.name, record) for o in scene.objects}
+    known = _parts_by_object(record)
+    baked = {o.name: known.get(o.name, []) for o in scene.objects}
     if {part.name for parts in baked.values() for part in parts} != {o.name for o in record.objects} or not all(
         _fits(parts, o.mesh.bounds, len(o.mesh.faces), cuts)
         for parts, o in zip(baked.values(), scene.objects, strict=True)
@@ -103,9 +104,12 @@ def materials_in_views(store: Store) -> dict[str, str]:
     return {str(name): str(material) for artefact in found for name, material in artefact.meta["objects"]}
 
 
-def _parts_of(name: str, record: SceneRecord) -> list[ObjectRecord]:
-    """The store's records of an object: the object itself, or the parts it was cut into for probes."""
-    return [o for o in record.objects if o.name == name or o.name.startswith(f"{name}.part")]
+def _parts_by_object(record: SceneRecord) -> dict[str, list[ObjectRecord]]:
+    """The store's records by object: the object itself, or the parts it was cut into for probes."""
+    found: dict[str, list[ObjectRecord]] = {}
+    for o in record.objects:
+        found.setdefault(o.part_of or o.name, []).append(o)
+    return found
 
 
 def _fits(parts: list[ObjectRecord], bounds: tuple[object, object], faces: int, cuts: set[str]) -> bool:

@@ -122,6 +122,16 @@ def test_other_geometry_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture
     assert "geometry of its scene" in caplog.text and len(caplog.records) == 1
 
 
+def test_an_object_whose_name_begins_like_a_part_of_another_is_none(tmp_path: Path, caplog) -> None:
+    names, corners = ("hall", "hall.partition"), "\n".join(OBJ.strip().splitlines()[:4])
+    faces = [f"o {name}\nusemtl {name}\nf {n} {n + 1} {n + 2} {n + 3}" for name, n in zip(names, (1, 5), strict=True)]
+    file = tmp_path / "floor.obj"
+    file.write_text("\n".join([corners, corners.replace(" 0 ", " 1 "), *faces]))
+    with bake(load_scene(file), tmp_path / "s", quality=TINY, only=["geometry"]) as store, caplog.at_level(30):
+        found = scene_of(store)
+    assert [o.name for o in found.objects] == [*names] and "geometry of its scene" not in caplog.text
+
+
 def test_a_scene_made_in_memory_has_to_be_named(tmp_path: Path) -> None:
     store = bake(plane(), tmp_path / "s", quality=TINY, only=["geometry"])
     with pytest.raises(UserError, match="--scene"):
