@@ -126,7 +126,7 @@ def test_a_grid_over_an_object_in_a_mix(lambent, store, tmp_path):
         (("--height", "1"), "apply to --object only"),
         (("--object", "floor", "--grid", "plane"), "--grid: excludes --object"),
         (("--light", "lump=off"), "unknown light group; found lump"),
-        (("--light", "lamp"), "cannot be read as light"),
+        (("--light", "lamp"), "is no light setting"),
         (("--variant", "evning"), "did you mean 'evening'?"),
         (("--error", "0"), "--error"),
         (("--maintenance", "1.2"), "--maintenance"),

@@ -174,7 +174,7 @@ def parse_light(texts: Iterable[str]) -> MixTrack:
         name, (value, _, at) = name.strip(), value.partition("@")
         time_s = _number(at, text) if at else 0.0
         if not name or not value:
-            raise UserError("cannot be read as light", field="--light", got=text, expected=EXPECTED)
+            raise UserError("is no light setting", field="--light", got=text, expected=EXPECTED)
         of_name = said.setdefault(name, {})
         if time_s in of_name:
             raise UserError("names a light twice", field="--light", got=text, hint="join its values with a comma")
@@ -228,5 +228,5 @@ def _number(word: str, text: str) -> float:
     except ValueError:
         value = -1.0
     if not 0 <= value < 1e9:
-        raise UserError("cannot be read as light", field="--light", got=text, expected=EXPECTED)
+        raise UserError("is no light setting", field="--light", got=text, expected=EXPECTED)
     return value

@@ -69,6 +69,8 @@ def read(path: Path, notes: list[str] | None = None) -> MeshArrays:
     vertex: dict[str, Floats] = {}
     corners, sizes = np.zeros(0, np.int64), np.zeros(0, np.int64)
     for element in elements:
+        if not element.properties:
+            break  # rows of no bytes, of which a header may name any number
         if element.name == "vertex" and not element.lists:
             table = rows.take(element.row(0), element.count)
             vertex = {p[0]: table[f"{i}"].astype(float) for i, p in enumerate(element.properties)}

@@ -224,6 +224,7 @@ def test_ply_that_is_broken(tmp_path: Path) -> None:
         (sound["ascii"].replace(b"float x", b"floot x"), r"header cannot be read"),
         (sound["ascii"].replace(b"format ascii 1.0\n", b""), r"header cannot be read"),
         (sound["ascii"].replace(b"property float y\n", b""), r"."),
+        (b"ply\nformat ascii 1.0\nelement vertex " + b"9" * 30 + b"\nend_header\n", r"has no vertices"),
     ]
     for data, said in broken:
         path.write_bytes(data)
