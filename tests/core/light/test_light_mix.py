@@ -55,11 +55,11 @@ def test_tracks_change_evenly_between_the_times_of_each_group():
 @pytest.mark.parametrize(
     ("texts", "message"),
     [
-        (["lamp"], "read as light"), (["=0.5"], "read as light"), (["lamp="], "read as light"),
-        (["lamp=bright"], "read as light"), (["lamp=-1"], "read as light"), (["lamp=nan"], "read as light"),
+        (["lamp"], "no light setting"), (["=0.5"], "no light setting"), (["lamp="], "no light setting"),
+        (["lamp=bright"], "no light setting"), (["lamp=-1"], "no light setting"), (["lamp=nan"], "no light setting"),
         (["lamp=1e6"], "out of range"), (["lamp=100K"], "temperature is out of range"),
         (["lamp=#000000"], "cannot be black"), (["lamp=0.5,0.6"], "two values for intensity"),
-        (["lamp=0.5", "lamp=off"], "a light twice"), (["lamp=1@x"], "read as light"),
+        (["lamp=0.5", "lamp=off"], "a light twice"), (["lamp=1@x"], "no light setting"),
     ],
 )  # fmt: skip
 def test_what_is_no_light_is_refused_in_one_line(texts, message):
