@@ -87,7 +87,7 @@ def of_json(content: bytes, random: Random) -> bytes:
         holder.extend([holder[key]] * int(random.choice([1, 3, 300])))
     elif way == 2:
         holder[key] = json.loads(json.dumps(other_holder[other_key]))
-    elif way == 3 and isinstance(holder[key], int | float):
+    elif way == 3 and isinstance(holder[key], int | float) and abs(holder[key]) < 1e300:  # a float has no more
         holder[key] = holder[key] * random.choice([-1, 2, 0.5, 1000, 1e9]) + random.choice([0, 1, -1])
     else:
         odd, holder[key] = ODD_JSON[int(random.integers(len(ODD_JSON)))], "ODD VALUE"
