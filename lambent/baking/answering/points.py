@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -45,14 +45,6 @@ class GatherPoints:
         return GatherPoints(side, texel, block)
 
 
-def in_few_charts(spots: Spots) -> Spots:
-    """Spots of which each chart can have a point: in place of too many charts come the objects, or one for all."""
-    for chart in (spots.chart, spots.object, np.zeros_like(spots.object)):
-        if sum(len(np.unique(chart[lit])) for lit in spots.lit) <= MOST_POINTS:
-            break
-    return replace(spots, chart=chart)
-
-
 def gather_points(spots: Spots, width: int, block: int) -> GatherPoints:
     """One lit texel of each block x block texels, chart and side: the one nearest to the block's middle."""
     lit = [np.flatnonzero(spots.lit[side]) for side in range(2)]
@@ -73,7 +65,7 @@ def bounded_points(spots: Spots, width: int, block: int, patches: int) -> Gather
     """`gather_points` of blocks of such a size, or another.
 
     Blocks are smaller in small maps, where there would be fewer than POINTS_OF_PATCH points for each of so many
-    patches, and larger where rays could not name all points. Spots are those of `in_few_charts`.
+    patches, and larger where rays could not name all points.
     """
     found = gather_points(spots, width, block)
     while len(found.texel) < POINTS_OF_PATCH * patches and block > 1:

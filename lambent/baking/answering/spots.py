@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from lambent.baked.answering.rays import MOST_POINTS
 from lambent.baking.running.tiles import slices
 from lambent.baking.surfaces.texels import POINTS
 from lambent.baking.tracing.lights.sun import SunRays
@@ -39,7 +40,7 @@ class Spots:
     sun : (2, K, 3) float32
         Direct irradiance of the sun, W/m^2.
     area : (K,) m^2, about.
-    object, material, chart : (K,) integers.
+    object, material, chart : (K,) integers; charts are no more than points have names (`in_few_charts`).
     position, normal : (K, 3)
     index : (K,) row * width + column
     """
@@ -103,12 +104,21 @@ def spots_of(traced: TracedScene, maps: list[Floats], directs: list[Floats], of_
         direct[of_sun] += sun
     light *= there[..., None]
     direct *= there[..., None]
-    return Spots(
+    found = Spots(
         lit & there, there, light, direct, sun * there[..., None],
         texels.spacing.astype(float) ** 2, object_of, material,
         traced.labels.reshape(-1)[texels.index], texels.positions.mean(axis=1).astype(float),
         normalize(texels.normals.mean(axis=1).astype(float)), texels.index,
     )  # fmt: skip
+    return in_few_charts(found)
+
+
+def in_few_charts(spots: Spots) -> Spots:
+    """Spots of which each chart can have a point: in place of too many charts come the objects, or one for all."""
+    for chart in (spots.chart, spots.object, np.zeros_like(spots.object)):
+        if sum(len(np.unique(chart[lit])) for lit in spots.lit) <= MOST_POINTS:
+            break
+    return replace(spots, chart=chart)
 
 
 def sun_at(traced: TracedScene) -> NDArray[np.float32]:

@@ -240,7 +240,6 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
     """Compute the transfer between patches, and the rays between points."""
     from lambent.baking.answering.points import (
         bounded_points,
-        in_few_charts,
         neighbours,
         points_near,
         receiving_points,
@@ -250,7 +249,7 @@ def _between(context: BakeContext, ends: RayEnds, spots: Spots, clusters: Cluste
     from lambent.baking.answering.transfer import Between, light_seen, neighbouring_texels, sender_means, transfer_of
 
     how: Settings = context.settings(KIND)
-    spots, width = in_few_charts(spots), context.traced.texels.width
+    width = context.traced.texels.width
     sides = [context.traced.in_view(sign)[0] for sign in SIGNS[: side_count(context)]]
     coarse = bounded_points(spots, width, how.block, clusters.count)
     distance = np.zeros(len(coarse.texel))

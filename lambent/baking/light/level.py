@@ -45,25 +45,24 @@ def with_level(clean: Floats, noisy: Floats, known: Flags, labels: Indices, vari
     noise = (sampled - light) ** 2 if variance is None else np.asarray(variance, np.float64)
     counted = known & (labels >= 0)
     _, chart = np.unique(labels, return_inverse=True)
-    groups = np.zeros(labels.shape, int), chart.reshape(labels.shape)
+    chart = chart.reshape(labels.shape)
 
-    def sums(group: Indices, *values: Floats) -> list[Any]:
-        """Sums over each group at its texels (H, W)."""
-        return [np.bincount(group.reshape(-1), (counted * one).reshape(-1))[group] for one in values]
+    def by_chart(*values: Floats) -> list[Any]:
+        """Sums over each chart (C,)."""
+        return [np.bincount(chart.reshape(-1), (counted * one).reshape(-1)) for one in values]
 
-    of_path = np.zeros(light.shape)
-    for group in groups:
-        of_samples, of_noise = sums(group, sampled, noise)
-        paths = _share(of_samples**2, of_noise, np.where(of_samples > 0, np.inf, 0.0))
-        of_path += np.clip(paths / FEW - 1, 0, 1) * (_share(of_noise, of_samples, 0.0) - of_path)
+    of_samples, of_noise = by_chart(sampled, noise)
+    of_path: Any = 0.0
+    for some, their_noise in ((of_samples.sum(), of_noise.sum()), (of_samples, of_noise)):
+        paths = _share(some**2, their_noise, np.where(some > 0, np.inf, 0.0))
+        of_path = of_path + np.clip(paths / FEW - 1, 0, 1) * (_share(their_noise, some, 0.0) - of_path)
 
     both = np.stack([sampled, light], axis=-1).astype(np.float32)
     means, count = chart_means(both, counted, labels, REACH)
     of_samples, of_light = np.moveaxis(means.astype(float) * count[..., None], -1, 0)
-    quotient, trust = _share(of_samples, of_light, 1.0), _trust(of_path, of_light)
-    doubted = (1 - trust) * light
-    of_samples, of_noise, of_light = sums(groups[1], doubted * quotient, doubted * of_path, doubted)
-    mean = 1 + _trust(_share(of_noise, of_light, 0.0), of_light) * (_share(of_samples, of_light, 1.0) - 1)
+    quotient, trust = _share(of_samples, of_light, 1.0), _trust(of_path[chart], of_light)
+    of_samples, of_light = by_chart((1 - trust) * light * quotient, (1 - trust) * light)
+    mean = (1 + _trust(of_path, of_light) * (_share(of_samples, of_light, 1.0) - 1))[chart]
     scale = np.where(labels >= 0, mean + trust * (quotient - mean), 1.0)
     return np.asarray(clean * scale[..., None], clean.dtype)
 

@@ -69,17 +69,15 @@ def read(path: Path, notes: list[str] | None = None) -> MeshArrays:
     vertex: dict[str, Floats] = {}
     corners, sizes = np.zeros(0, np.int64), np.zeros(0, np.int64)
     for element in elements:
-        if not element.properties:
-            break  # rows of no bytes, of which a header may name any number
+        if element.name not in ("vertex", "face") or not element.properties:
+            break  # what follows the faces is invisible; of rows without properties a header may name any number
         if element.name == "vertex" and not element.lists:
             table = rows.take(element.row(0), element.count)
             vertex = {p[0]: table[f"{i}"].astype(float) for i, p in enumerate(element.properties)}
         elif element.name == "face" and element.lists == 1:
             corners, sizes = rows.faces(element)
-        elif element.name in ("vertex", "face"):
-            raise UserError("has unsupported lists", file=path, field=f"element {element.name}")
         else:
-            break  # elements after the faces are invisible
+            raise UserError("has unsupported lists", file=path, field=f"element {element.name}")
     if notes is not None:
         notes += ["vertex colours are ignored"] if "red" in vertex or "diffuse_red" in vertex else []
         notes += ["triangle strips are ignored"] if any(e.name == "tristrips" for e in elements) else []

@@ -15,13 +15,12 @@ from lambent.baking.answering.points import (
     GatherPoints,
     bounded_points,
     gather_points,
-    in_few_charts,
     neighbours,
     receiving_points,
     refined_points,
     seeing,
 )
-from lambent.baking.answering.spots import LEAST, Spots
+from lambent.baking.answering.spots import LEAST, Spots, in_few_charts
 from lambent.baking.answering.transfer import AROUND, chosen_rays, neighbouring_texels, sender_means, transfer_of
 from lambent.materials.document import Material
 from lambent.scenes.scene import Scene
