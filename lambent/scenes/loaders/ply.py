@@ -97,7 +97,7 @@ def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:
     """Byte order (a value of `ORDERS`), elements, and the start of the data."""
     end = data.find(b"end_header", 0, HEADER_MAX)
     if not data.startswith(b"ply") or end < 0:
-        raise UserError("not a PLY file", file=path, got=repr(data[:4]), expected="ply at its start")
+        raise UserError("not a PLY file", file=path, got=repr(data[:4]), expected="ply ... end_header")
     order, elements = "", []
     for number, line in enumerate(data[:end].decode("latin-1").splitlines(), 1):
         words = line.split()
