@@ -12,13 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import xatlas
 
 from lambent.baking.surfaces.clusters import clusters_of
 from lambent.baking.surfaces.copies import Copies
 from lambent.baking.surfaces.layers import in_first_layer, layers_of, lie_flat
+from lambent.baking.surfaces.parametrization import Laid, laid_flat
 from lambent.core.arrays import Flags, Floats, Indices, components
-from lambent.core.errors import UserError
 from lambent.core.geometry.directions import normalize
 from lambent.core.geometry.triangles import area_vectors, cross_2d, triangle_areas, triangle_normals
 from lambent.core.progress import Progress, silent
@@ -120,37 +119,29 @@ def charts_of(
     return charts
 
 
-def _unwrapped(
-    objects: tuple[SceneObject, ...], pieces: list[Piece], copies: Copies
-) -> list[tuple[Floats, Indices, Floats]]:
-    """Output of xatlas by piece: original vertex of each vertex, faces, and coordinates. Copies share it.
+def _unwrapped(objects: tuple[SceneObject, ...], pieces: list[Piece], copies: Copies) -> list[Laid]:
+    """What xatlas makes of each piece. Copies share it.
 
     Pieces are scaled to one size: xatlas ignores triangles below 1.2e-7 of its units squared.
     """
-    atlas = xatlas.Atlas()
     keys = [(int(copies.first[piece.owner]), id(piece.faces)) for piece in pieces]
     number: dict[tuple[int, int], int] = {}
+    meshes = []
     for piece, key in zip(pieces, keys, strict=True):
         if key in number:
             continue
         number[key] = len(number)
-        o = objects[piece.owner]
-        vertices, faces = np.unique(o.mesh.faces[piece.faces], return_inverse=True)
-        at = o.mesh.positions[vertices].astype(np.float64)
+        mesh = objects[piece.owner].mesh
+        vertices, faces = np.unique(mesh.faces[piece.faces], return_inverse=True)
+        at = mesh.positions[vertices].astype(np.float64)
         at = (at - at.mean(axis=0)) / max(float(np.ptp(at, axis=0).max()), 1e-30)
         faces = np.ascontiguousarray(faces.reshape(-1, 3), dtype=np.uint32)
-        try:
-            atlas.add_mesh(at.astype(np.float32), faces, o.mesh.normals[vertices])
-        except (RuntimeError, ValueError) as error:
-            raise UserError(f"object cannot be unwrapped ({error})", field=o.name) from error
-    packing = xatlas.PackOptions()
-    packing.resolution, packing.padding, packing.bilinear = 16 * int(np.ceil(np.sqrt(len(number)))), 0, False
-    atlas.generate(xatlas.ChartOptions(), packing, False)
-    found = [atlas[i] for i in range(len(number))]
+        meshes.append((at.astype(np.float32), faces, mesh.normals[vertices]))
+    found = laid_flat(meshes)
     return [found[number[key]] for key in keys]
 
 
-def _charts(mesh: Mesh, faces: Indices, pieces: list[tuple[Floats, Indices, Floats]], size_m: Floats) -> list[Chart]:
+def _charts(mesh: Mesh, faces: Indices, pieces: list[Laid], size_m: Floats) -> list[Chart]:
     """The charts of an object from xatlas's `pieces`, of faces (K,) with texels of `size_m` (K,).
 
     Faces without area in the map, stretched ones, and those that pass others of their chart within a texel have no

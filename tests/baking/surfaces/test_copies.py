@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import xatlas
 
 from lambent.baking.surfaces.atlas import unwrap
 from lambent.baking.surfaces.copies import STEP, copies_of
+from lambent.baking.surfaces.parametrization import Laid, Triangles, laid_flat
 from lambent.core.arrays import Floats
 from lambent.materials.document import Material
 from lambent.scenes.geometry import box, sphere, transformed
@@ -52,12 +52,11 @@ def test_objects_of_one_mesh_are_unwrapped_once(monkeypatch: pytest.MonkeyPatch)
     scene = Scene("many", tuple(objects), {"m": Material()})
     asked = []
 
-    class Counting(xatlas.Atlas):  # type: ignore[misc]
-        def add_mesh(self, *arrays: object) -> None:
-            asked.append(1)
-            super().add_mesh(*arrays)
+    def counting(meshes: list[Triangles]) -> list[Laid]:
+        asked.extend(meshes)
+        return laid_flat(meshes)
 
-    monkeypatch.setattr("lambent.baking.surfaces.charts.xatlas.Atlas", Counting)
+    monkeypatch.setattr("lambent.baking.surfaces.charts.laid_flat", counting)
     atlas = unwrap(scene, 448)
     assert len(asked) == len(meshes)
     taken = np.full((atlas.height, atlas.width), -1)
