@@ -45,6 +45,8 @@ def main(arguments):
         print(__doc__)
         return 0 if arguments[:1] in (["-h"], ["--help"]) else 2
     os.environ["PYTHONUTF8"] = "1"
+    if arguments[0] in ("demo", "lambent"):  # nothing is imported from the folder that the user is in
+        os.environ["PYTHONSAFEPATH"] = "1"
     set_up(for_tests=arguments[0] in ("test", "docs"))
     return tasks[arguments[0]](arguments[1:])
 

@@ -25,6 +25,7 @@ from typing import TypeVar
 
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
+from lambent.core.machine import python_environment
 
 T = TypeVar("T")
 LLVM_OLDEST = 19  # Dr.Jit refuses 14 and aborts with 15 to 18
@@ -197,7 +198,7 @@ def _try(name: str, library: Path | None) -> Engine | str:
     """Render a few pixels with variant `name` in a subprocess; returns the engine, or a line with the reason."""
     if name.startswith("cuda") and _cuda_driver() is None:
         return "no CUDA driver"
-    environment = os.environ | _kernel_cache_without_home()
+    environment = python_environment() | _kernel_cache_without_home()
     if library is not None:
         environment[LIBRARY_VARIABLE] = str(library)
     try:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from lambent.core.errors import UserError
-from lambent.core.machine import has_display
+from lambent.core.machine import has_display, python_environment
 from lambent.core.progress import Progress, silent
 
 NAME = "load"
@@ -75,7 +75,9 @@ def run(effort: Effort, inputs: Sequence[Path] = (), progress: Progress = silent
                 progress(turn * len(commands) + index, runs * len(commands), f"load: {name}")
                 measured[name].append(timed(command))
         drawing = [sys.executable, "-c", _GPU.format(*size), str(store)]
-        done = subprocess.run(drawing, capture_output=True, text=True, timeout=TIMEOUT_S, check=True)
+        done = subprocess.run(
+            drawing, capture_output=True, text=True, timeout=TIMEOUT_S, check=True, env=python_environment()
+        )
         gpu_mb = float(done.stdout.split()[-1]) / 1e6
     rows = [_row(name, times, gpu_mb if name != "--help" else None) for name, times in measured.items()]
     return {"rows": rows, "summary": {"width": size[0], "height": size[1], "runs": runs, "store": store.name}}
@@ -90,7 +92,8 @@ def timed(command: list[str]) -> tuple[float, float | None]:
         If the command fails.
     """
     # Through a small separate process: a forked child's peak starts at its parent's memory.
-    done = subprocess.run([sys.executable, "-c", _TIMED, *command], capture_output=True, text=True, timeout=TIMEOUT_S)
+    timing = [sys.executable, "-c", _TIMED, *command]
+    done = subprocess.run(timing, capture_output=True, text=True, timeout=TIMEOUT_S, env=python_environment())
     if done.returncode != 0:
         last = done.stderr.strip().splitlines()[-1:] or [f"code {done.returncode}"]
         raise UserError(f"command failed ({last[0]})", field=" ".join(command[2:5]))

@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 import typer
 
 from lambent.cli.console import Json, show, table
-from lambent.core.machine import core_count, memory_bytes
+from lambent.core.machine import core_count, memory_bytes, python_environment
 
 MEMORY_NEEDED_GB = 4
 PROBE_SECONDS = 120
@@ -183,7 +183,9 @@ def _ask(program: str) -> tuple[object, str]:
     """The answer of a small program run in a separate process, or (None, the reason in one line)."""
     command = [sys.executable, "-c", program]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=PROBE_SECONDS, check=False)
+        done = subprocess.run(
+            command, env=python_environment(), capture_output=True, text=True, timeout=PROBE_SECONDS, check=False
+        )
     except subprocess.TimeoutExpired:
         return None, f"test program gave no answer within {PROBE_SECONDS} s"
     answer = next((line for line in done.stdout.splitlines() if line.startswith("answer ")), None)

@@ -37,6 +37,7 @@ FAULTS_OF_THE_DISK = {
 def main() -> None:
     """Entry point of the `lambent` command."""
     signal.signal(signal.SIGINT, _leave)
+    os.environ["PYTHONSAFEPATH"] = "1"  # processes that libraries start import nothing from the current folder
     build_app()  # imports the commands; no work can be lost yet
     sys.unraisablehook = _unraisable
     signal.signal(signal.SIGINT, interrupt)

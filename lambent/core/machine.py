@@ -1,4 +1,4 @@
-"""The machine: processor, memory, display."""
+"""The machine: processor, memory, display, and other processes of this Python."""
 
 from __future__ import annotations
 
@@ -35,3 +35,13 @@ def memory_bytes() -> int:
 def has_display() -> bool:
     """Whether a window can open."""
     return not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def python_environment() -> dict[str, str]:
+    """Environment of another process of this Python, which finds modules where this one does.
+
+    By default, `python -m` and `python -c` import from the current folder first, which may be one that came with a
+    scene.
+    """
+    places = os.pathsep.join(place or os.getcwd() for place in sys.path)
+    return {**os.environ, "PYTHONSAFEPATH": "1", "PYTHONPATH": places}

@@ -15,8 +15,9 @@ from lambent.baked.shared_exponent import packed_rgb, unpacked_rgb
 from lambent.baked.transport.tails import FIXED, SecondBands, Tails
 from lambent.core.views.camera import Camera
 from lambent.editing.canvas import HostCanvas, viewed
+from lambent.editing.interreflection import entries
 from lambent.editing.interreflection import whole as whole_module
-from lambent.editing.interreflection.entries import TermLight
+from lambent.editing.interreflection.entries import Cells, TermLight
 from lambent.editing.interreflection.noise import light_of, noise
 from lambent.editing.interreflection.picture import FrozenPicture
 from lambent.editing.interreflection.powers import bands_of, powers
@@ -144,6 +145,22 @@ def test_monomials_are_those_of_the_material_alone() -> None:
     assert found.values(PAPER).max() <= 1
     lengths = sorted(found.exponents.sum(axis=1).tolist())
     assert lengths == sorted(len(order) for order in counts)
+
+
+def test_no_loop_runs_where_nothing_contributes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without cells, loops would add to sums that are not there: their compiled additions are not checked."""
+
+    def never(*_: object) -> None:
+        raise AssertionError("a loop ran")
+
+    power, term = powers(DIFFUSE, START, "paper", (1, 1)), light(DIFFUSE).parts["paper"].terms[0]
+    cells = Cells.of(power, term.met)
+    monkeypatch.setattr(entries, "_rows", never)
+    monkeypatch.setattr(entries, "_pixels", never)
+    band = np.ones((term.bands, 3))
+    held, _ = entries.rows(term, band, power.weight, cells, np.zeros(term.bands, int), 1)
+    assert len(cells) == len(held) == 0 < len(term.values)
+    entries.add_pixels(np.zeros((0, 3, len(term.units)), np.float32), term, band, power.weight, cells, np.ones((3, 1)))
 
 
 def whole_picture(light_of: Interreflections) -> WholePicture:

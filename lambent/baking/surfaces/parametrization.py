@@ -17,6 +17,7 @@ import numpy as np
 import xatlas
 
 from lambent.core.arrays import Floats, Indices
+from lambent.core.machine import python_environment
 
 ATTEMPTS = 3  # at the same meshes: races are rare, and what fails that often always will
 
@@ -31,8 +32,7 @@ def laid_flat(meshes: Sequence[Triangles]) -> list[Laid]:
     """
     if not meshes:
         return []
-    given = pickle.dumps(meshes)
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    given, environment = pickle.dumps(meshes), python_environment()
     for _ in range(ATTEMPTS):
         done = subprocess.run([sys.executable, "-m", __name__], input=given, capture_output=True, env=environment)
         if done.returncode == 0:

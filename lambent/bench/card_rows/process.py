@@ -26,6 +26,7 @@ from typing import Any
 from lambent.baking.engine import VARIANT_VARIABLE
 from lambent.bench.card_rows.row import Absent, Row
 from lambent.core.errors import UserError
+from lambent.core.machine import python_environment
 
 MARK = "lambent-card "
 TICK_S = 1.0  # between reports of the time left
@@ -72,7 +73,7 @@ def figures(name: str, row: Row, effort: object, work: Path, limit_s: float) -> 
 
 @contextmanager
 def _started(name: str, row: Row, effort: object, work: Path, errors: Any) -> Iterator[subprocess.Popen[bytes]]:
-    environment = dict(os.environ)
+    environment = python_environment()
     if row.variant is not None:
         environment[VARIANT_VARIABLE] = row.variant
     process = subprocess.Popen(

@@ -176,7 +176,7 @@ class Cells:
     Attributes
     ----------
     number : (Z,)
-        Cell of each tail; 0 also for tails without one.
+        Cell of each tail; 0 also for tails without one, to which nothing is then added.
     power, row : (C,)
         Of each cell; sorted by monomial, then by row.
     """
@@ -210,7 +210,8 @@ def add_pixels(
     tail : (Z, 3)
         Factors of the tails.
     """
-    _pixels(out, *_entries(light), light.units, *_tables(band, tail, cells), np.asarray(factor, np.float32))
+    if len(cells):
+        _pixels(out, *_entries(light), light.units, *_tables(band, tail, cells), np.asarray(factor, np.float32))
 
 
 def rows(light: TermLight, band: Floats, tail: Floats, cells: Cells, row: Indices, count: int) -> tuple[Halves, float]:
@@ -225,7 +226,9 @@ def rows(light: TermLight, band: Floats, tail: Floats, cells: Cells, row: Indice
     # No sum exceeds that of all entries of a point.
     unit = unit_for(light.largest * float(np.abs(band).max() * np.abs(tail).max()))
     units = (light.units / np.float32(unit)).astype(np.float32)
-    _rows(out, *_entries(light), units, *_tables(band, tail, cells), np.asarray(row, np.int64), TAPS.astype(np.float32))
+    if len(cells):
+        rows_of = np.asarray(row, np.int64), TAPS.astype(np.float32)
+        _rows(out, *_entries(light), units, *_tables(band, tail, cells), *rows_of)
     return out.view(np.float16), unit
 
 

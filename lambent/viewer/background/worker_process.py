@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import IO, Any
 
 from lambent.core.errors import UserError
+from lambent.core.machine import python_environment
 from lambent.core.progress import Progress
 from lambent.viewer.background.work import Work, pending
 
@@ -46,7 +47,9 @@ class WorkerProcess:
         self._name, self._take, self._ends, self._wake = name, take, ends, wake
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - as long as the process
         command = [sys.executable, "-m", module, *words]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log)
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, env=python_environment()
+        )
         self._work: Work | None = Work(self._listen, lambda _: None, self._failed, wake)
 
     @property

@@ -21,6 +21,7 @@ from lambent.core.arrays import Floats
 from lambent.core.errors import UserError
 from lambent.core.light.colour import luminance, shown
 from lambent.core.light.false_colour import STOPS, Range, false_colour, ramp
+from lambent.core.machine import python_environment
 from lambent.core.pictures.images import to_bytes
 from lambent.core.pictures.metrics import psnr
 from lambent.core.progress import Progress
@@ -177,7 +178,8 @@ def flip_in_process(reference: Floats, test: Floats, progress: Progress) -> Floa
         pair, error, words = (Path(folder) / name for name in ("pair.npy", "error.npy", "words.txt"))
         np.save(pair, np.stack([reference, test]).astype(np.float32))
         command = [sys.executable, "-c", FLIP_PROGRAM, str(pair), str(error)]
-        with words.open("w") as log, subprocess.Popen(command, stdout=log, stderr=log) as worker:
+        environment = python_environment()
+        with words.open("w") as log, subprocess.Popen(command, stdout=log, stderr=log, env=environment) as worker:
             try:
                 while worker.poll() is None:
                     progress(0, 1, "FLIP")

@@ -30,7 +30,7 @@ def begun(tmp_path, monkeypatch):
 
     def begin(end):
         (tmp_path / "talking_worker.py").write_text(TALKS.format(end=end))
-        monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+        monkeypatch.syspath_prepend(tmp_path)
         monkeypatch.setattr(baking, "WORKER", "talking_worker")
         return Baking(Session.new("builtin:box", CAMERA, {"tray": TRAY}, size=SIZE), tmp_path / "store", (20,))
 

@@ -54,7 +54,7 @@ class Room:
         screen.pace.adaptive = screen.pace.traces = False
         screen.clock = time.monotonic
         (tmp_path / "baking_worker.py").write_text(WORKER.format(then=then))
-        monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{ROOT}")
+        monkeypatch.syspath_prepend(tmp_path)
         monkeypatch.setattr(rebaking, "WORKER", "baking_worker")
         monkeypatch.setattr(rebaking, "QUIET_S", 0.1)
         opened = Store.open(folder)
