@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from lambent.baking.light.groups import GroupMaps
     from lambent.baking.light.tiles import Stage
     from lambent.baking.photons.maps import PhotonMap
+    from lambent.baking.tracing.lights.lit_texels import SentLight
 
 log = logging.getLogger(__name__)
 
@@ -89,7 +90,7 @@ def keys(context: BakeContext) -> dict[str, str]:
     if _by_photons(context):
         effort.append([LightMapMethod.photons, how.photons_per_texel])
     elif how.gather_samples:
-        effort.append(["gathered from maps", REVISION_OF_IRRADIANCE])
+        effort.append(["gathered from maps, and lit texels", REVISION_OF_IRRADIANCE])
     if may_have_sun(context.scene):
         effort.append(["without the sun", REVISION_OF_SUN])
         if panes_of(context.scene):
@@ -288,6 +289,8 @@ def _samples(
         covered = np.zeros(texels.width * texels.height, bool)
         covered[texels.index[sides.valid.any(axis=1)]] = True
         of_map = covered.reshape(texels.height, texels.width)
+        if not stage.of_moments:
+            stage = replace(stage, sent=_sent(context, stage))
         run_jobs(
             writer,
             TileSampler(traced, stage),
@@ -306,6 +309,16 @@ def _samples(
 def lamps_apart(context: BakeContext) -> bool:
     """Whether light of lamps is computed apart from samples, as renderers draw it."""
     return not _by_photons(context) and bool(context.scene.lamps)
+
+
+def _sent(context: BakeContext, stage: Stage) -> SentLight | None:
+    """What texels send under the maps of a stage, or in direct light."""
+    from lambent.baking.tracing.sent_light import sent_light
+
+    sides = range(side_count(context))
+    maps = [lamp_light(context, side) for side in sides] if stage.lit is None else stage.lit[: len(sides)]
+    of_sides = [context.traced.in_view(SIGNS[side])[0] for side in sides]
+    return sent_light(context.traced, of_sides, maps, whole=stage.lit is not None, diffuse=stage.diffuse)
 
 
 def lamp_light(context: BakeContext, side: int) -> Floats:

@@ -21,6 +21,7 @@ from lambent.baking.light.level import with_level
 from lambent.baking.light.stitching import Cuts, stitched
 from lambent.baking.surfaces.texels import POINTS, Sides, Texels, area_of_texels, covered_share
 from lambent.baking.tracing import path_tracer
+from lambent.baking.tracing.lights.lit_texels import EVERY, LitTexels
 from lambent.baking.tracing.lights.sun import Unseen
 from lambent.baking.tracing.rays import block_sums, independent, vectors
 from lambent.core.arrays import Flags, Floats, Indices
@@ -39,7 +40,8 @@ class Sampling:
 
     With a `cache` (`path_tracer.radiance`), paths end at diffuse surfaces, and the scene must have no diffuse terms.
     Direct light of the sun `unseen` is left out. A `tally` sums parts of the light, the last `parts` of which are
-    stored in addition to the whole; the cache must then suit the tally.
+    stored in addition to the whole; the cache must then suit the tally. With `lit`, which takes EVERY samples or more
+    per pass, further paths begin at lit texels.
     """
 
     samples: tuple[int, int]
@@ -51,6 +53,7 @@ class Sampling:
     unseen: Unseen | None = None
     tally: path_tracer.Tally | None = None
     parts: int = 0
+    lit: LitTexels | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,23 +162,51 @@ def _sums_of_pass(scene: Any, points: path_tracer.Points, count: int, seed: tupl
     u_bsdf = _shifted(hammersley(samples), shifts[:2], k, texel)
     u_emitter = _shifted(r2(samples), shifts[2:], k, texel)
     sampler = independent(int(rng.integers(1 << 32)), n * samples)
-    found = _estimates(scene, sampler, at, u_bsdf, u_emitter, how)
+    sums = _summed(_estimates(scene, sampler, at, u_bsdf, u_emitter, how), samples)
+    if how.lit is not None:
+        sums += _summed(_of_lit(scene, points, count, how, how.lit, rng), samples // EVERY)
+    return sums.reshape(2, count, -1)
+
+
+def _summed(found: list[Any], samples: int) -> Floats:
+    """(n, 3 + 3 parts) sums of so many consecutive samples; those that are not finite count as 0."""
     usable = dr.all(dr.isfinite(found[0]))
     found = [dr.select(usable, e, 0.0) for e in found]
     dr.eval(found)
-    return np.concatenate([block_sums(e, samples).reshape(2, count, 3) for e in found], axis=-1)
+    return np.concatenate([block_sums(e, samples) for e in found], axis=-1)
 
 
 def _estimates(
     scene: Any, sampler: Any, at: path_tracer.Points, u_bsdf: Any, u_emitter: Any, how: Sampling
 ) -> list[Any]:
     """A sample (mi.Color3f) of each point: the whole, then the stored parts."""
-    if how.tally is None:
+    if how.tally is None and how.lit is None:
         return [how.estimate(scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache, how.unseen)]
+    tally = how.tally or path_tracer.AllLight()
     sums = path_tracer.irradiance_sums(
-        scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache, how.tally, how.unseen
+        scene, sampler, at, u_bsdf, u_emitter, how.max_depth, how.cache, tally, how.unseen, how.lit
     )
-    return [mi.Color3f(sum(sums[: how.tally.count])), *sums[len(sums) - how.parts :]]
+    return _whole_and_parts(sums, tally.count, how.parts)
+
+
+def _of_lit(
+    scene: Any, points: path_tracer.Points, count: int, how: Sampling, lit: LitTexels, rng: np.random.Generator
+) -> list[Any]:
+    """Likewise of each point, what paths by way of lit texels add."""
+    n, samples = 2 * count, how.per_pass // EVERY
+    shifts = rng.random((2, n), dtype=np.float32)
+    thread = dr.arange(mi.UInt32, n * samples)
+    texel, k = thread // samples, thread % samples
+    point = texel % dr.opaque(mi.UInt32, count) * POINTS + k % POINTS
+    at = path_tracer.Points(*(dr.gather(mi.Vector3f, v, point) for v in (points.position, points.normal, points.flat)))
+    u, tally = _shifted(r2(samples), shifts, k, texel), how.tally or path_tracer.AllLight()
+    sampler = independent(int(rng.integers(1 << 32)), n * samples)
+    sums = path_tracer.of_lit(scene, sampler, at, u, how.max_depth, how.cache, tally, how.unseen, lit)
+    return _whole_and_parts(sums, tally.count, how.parts)
+
+
+def _whole_and_parts(sums: list[Any], count: int, parts: int) -> list[Any]:
+    return [mi.Color3f(sum(sums[:count])), *sums[len(sums) - parts :]]
 
 
 def _shifted(points: Floats, shifts: Floats, k: Any, texel: Any) -> Any:

@@ -8,6 +8,7 @@ from typing import Any
 from lambent.baking.light.sampling import Sampling, TexelJob, tile_samples
 from lambent.baking.tracing import path_tracer
 from lambent.baking.tracing.group_tally import Direct
+from lambent.baking.tracing.lights.lit_texels import EVERY, LitTexels, SentLight
 from lambent.baking.tracing.traced_scene import TracedScene
 from lambent.core.arrays import Floats
 
@@ -32,6 +33,8 @@ class Stage:
         Store direct light too.
     of_moments : bool
         Sample first moments of incident light (`path_tracer.moment`).
+    sent : SentLight, optional
+        What lit texels send, for further paths by way of these.
     """
 
     samples: tuple[int, int]
@@ -43,6 +46,7 @@ class Stage:
     by_group: bool = False
     direct: Direct | None = None
     of_moments: bool = False
+    sent: SentLight | None = None
 
     def parts(self, traced: TracedScene) -> int:
         """Number of stored parts of the light."""
@@ -62,7 +66,8 @@ class Stage:
         estimate = path_tracer.moment if self.of_moments else path_tracer.irradiance
         unseen = traced.unseen(diffuse=self.diffuse)
         how = self.samples, self.noise, self.max_depth, self.per_pass
-        return Sampling(*how, cache, estimate, unseen, tally, self.parts(traced))
+        lit = None if self.sent is None or self.per_pass < EVERY else LitTexels(self.sent)
+        return Sampling(*how, cache, estimate, unseen, tally, self.parts(traced), lit)
 
 
 class TileSampler:

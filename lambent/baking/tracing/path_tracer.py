@@ -16,6 +16,7 @@ import drjit as dr
 import mitsuba as mi
 
 from lambent.baking.tracing import rays
+from lambent.baking.tracing.lights.lit_texels import LitTexels
 from lambent.baking.tracing.lights.sun import Sun, Unseen
 
 ROULETTE_DEPTH = 2
@@ -74,6 +75,8 @@ class Start:
     The density weights the emitters that the ray hits; `direct` counts them in full, if nothing else samples them. The
     ray does not see the sun `unseen`. If that sun passes panes, clear glass is ignored until the path scatters:
     everything that a ray sees straight through glass is emitter-sampled from the start. Only `active` paths are traced.
+    Where it meets `lit` texels, light is shared with rays to these. Such rays have the texels' numbers as `chosen`,
+    see no emitters, and are divided by the density of both kinds.
     """
 
     ray: Any
@@ -82,6 +85,8 @@ class Start:
     direct: bool
     unseen: Unseen | None = None
     active: Any = True
+    lit: LitTexels | None = None
+    chosen: Any = None
 
 
 def camera_start(ray: Any) -> Start:
@@ -107,6 +112,7 @@ def radiance_sums(scene: Any, sampler: Any, start: Start, max_depth: int, cache:
     found: list[Any] = _trace(
         scene, sampler, mi.Ray3f(start.ray), mi.SurfaceInteraction3f(start.origin), mi.Float(start.pdf),
         mi.Bool(start.direct), max_depth, cache, rays.has_holes(scene), start.unseen, tally, start.active,
+        start.lit, start.chosen,
     )  # fmt: skip
     return found
 
@@ -129,7 +135,7 @@ def sample_emitter(
 
 
 @dr.syntax
-def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, unseen, tally, active):  # type: ignore[no-untyped-def]
+def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, unseen, tally, active, sent, to):  # type: ignore[no-untyped-def]
     width = dr.width(ray.o)
     sums = tally.begin(width)
     throughput = dr.ones(mi.Color3f, width)
@@ -145,6 +151,8 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, un
         if unseen is not None and unseen.first is not None:
             pdf_emitter = dr.select(straight, unseen.first.pdf(origin, ds, depth == 0, active & straight), pdf_emitter)
         weight = dr.select(direct, 1.0, _balance(pdf, pdf_emitter))
+        if to is not None:
+            weight = dr.select(depth == 0, 0.0, weight)
         light = emitter.eval(si, active)
         if unseen is not None:
             light -= dr.select(straight & ~si.is_valid(), unseen.radiance(ray.d), 0.0)
@@ -154,6 +162,13 @@ def _trace(scene, sampler, ray, origin, pdf, direct, max_depth, cache, holes, un
         factor = dr.select(shows_sun, factor, 0.0)
         sums = tally.emitted(sums, brought, emitter, ray.d, factor, straight | (depth == 0))
         active &= si.is_valid() & (depth < max_depth)
+        if sent is not None:
+            texel, others = sent.met(origin.p, si, active & (depth == 0))
+            if to is None:
+                throughput *= dr.select(others > 0, _balance(pdf, others), 1.0)
+            else:
+                active &= (depth > 0) | (texel == to)
+                throughput *= dr.select(depth == 0, dr.rcp(pdf + others), 1.0)
         sums = tally.cached(sums, throughput, cache, si, active, depth == 0)
 
         at = mi.SurfaceInteraction3f(si)  # oriented to the ray's side, for sampling a guided sky
@@ -224,12 +239,38 @@ def irradiance(
 
 def irradiance_sums(
     scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Any, tally: Tally,
-    unseen: Unseen | None = None,
+    unseen: Unseen | None = None, lit: LitTexels | None = None,
 ) -> list[Any]:  # fmt: skip
-    """Likewise as the sums of a tally, with a cache that suits it."""
-    parts = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, tally, unseen)
+    """Likewise as the sums of a tally, with a cache that suits it; with `lit`, `of_lit` adds the rest."""
+    parts = _contributions(scene, sampler, points, u_bsdf, u_emitter, max_depth, cache, tally, unseen, True, lit)
     (along, _), (direct, _) = parts
     return [mi.Color3f(one + other) for one, other in zip(along, direct, strict=True)]
+
+
+def direct(scene: Any, points: Points, sampler: Any, unseen: Unseen | None = None) -> Any:
+    """One sample of irradiance (mi.Color3f) at each point, W/m^2, straight from emitters that are not `unseen`."""
+    si = _at(points)
+    lights = scene if unseen is None or unseen.first is None else unseen.first.scene
+    ds, value = sample_emitter(scene, lights, si, sampler.next_2d(), mi.Bool(True), rays.has_holes(scene), unseen)
+    return value * dr.maximum(dr.dot(ds.d, points.normal), 0.0)
+
+
+def of_lit(
+    scene: Any, sampler: Any, points: Points, u: Any, max_depth: int, cache: Any, tally: Tally, unseen: Unseen | None,
+    lit: LitTexels,
+) -> list[Any]:  # fmt: skip
+    """What one path of each point by way of a lit texel, chosen by u (mi.Point2f), adds to `irradiance_sums`."""
+    si = _at(points)
+    ray, chosen = lit.ray(scene, si.p, si.n, u.x, mi.Point2f(u.y, sampler.next_1d()))
+    cosine = dr.maximum(dr.dot(ray.d, points.normal), 0.0)
+    start = Start(ray, si, cosine / dr.pi, False, unseen, cosine > 0, lit, chosen)
+    return [mi.Color3f(cosine * one) for one in radiance_sums(scene, sampler, start, max_depth, cache, tally)]
+
+
+def _at(points: Points) -> Any:
+    si = dr.zeros(mi.SurfaceInteraction3f, dr.width(points.position))
+    si.p, si.n, si.sh_frame = points.position, mi.Normal3f(points.flat), mi.Frame3f(mi.Normal3f(points.normal))
+    return si
 
 
 def arriving(
@@ -255,14 +296,13 @@ def moment(
 
 def _contributions(
     scene: Any, sampler: Any, points: Points, u_bsdf: Any, u_emitter: Any, max_depth: int, cache: Any, tally: Tally,
-    unseen: Unseen | None, active: Any = True,
+    unseen: Unseen | None, active: Any = True, lit: LitTexels | None = None,
 ) -> list[tuple[list[Any], Any]]:  # fmt: skip
     """Sums of irradiance by sampling of directions, and by emitters, each with the directions it comes from."""
-    si = dr.zeros(mi.SurfaceInteraction3f, dr.width(points.position))
-    si.p, si.n, si.sh_frame = points.position, mi.Normal3f(points.flat), mi.Frame3f(mi.Normal3f(points.normal))
+    si = _at(points)
     local = mi.warp.square_to_cosine_hemisphere(u_bsdf)
     ray = rays.leaving(scene, si.p, si.n, si.to_world(local))
-    start = Start(ray, si, local.z / dr.pi, False, unseen, active)
+    start = Start(ray, si, local.z / dr.pi, False, unseen, active, lit)
     along = radiance_sums(scene, sampler, start, max_depth, cache, tally)
     first = None if unseen is None else unseen.first
     lights = scene if first is None else first.scene
