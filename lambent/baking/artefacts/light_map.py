@@ -6,7 +6,6 @@ them, and the noise is estimated from them.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -32,8 +31,6 @@ if TYPE_CHECKING:
     from lambent.baking.photons.maps import PhotonMap
     from lambent.baking.tracing.lights.lit_texels import SentLight
 
-log = logging.getLogger(__name__)
-
 KIND = "light_map"
 NEEDS = ("geometry",)
 REVISION, REVISION_OF_IRRADIANCE, REVISION_OF_SUN, REVISION_OF_PANES, REVISION_OF_GROUPS = 5, 9, 3, 1, 1
@@ -42,13 +39,6 @@ IRRADIANCE = tuple(f"light_map/{side}" for side in SIDES)
 NOISE = tuple(noise_name(side) for side in SIDES)
 TRACED, GATHERED = (f"light_map/{stage}" for stage in ("traced", "gathered"))
 PHOTONS, MOMENTS = "light_map/photons", "light_map/leaning"
-# Share of lit texels whose noise exceeds their light: at most .10 in 23 rooms, .28 and .35 in two lit through a keyhole
-# and by a spot of one degree, which lose a third of their light.
-NOISY = 0.2
-TOO_DARK = (
-    "%.0f %% of the light map is lit by paths too rare to be found often: there it is too dark. "
-    "A higher --quality finds more"
-)
 SIGNS = (1.0, -1.0)  # of the normal, by side
 Maps = list[tuple[Floats, dict[str, float]]]  # by side: irradiance (H, W, 3) and its notes
 
@@ -387,11 +377,5 @@ def _noise(context: BakeContext) -> None:
         of_samples = (sampled_halves(context.store.read(name)) for name in raw)
         lamps = (lamp_light(context, side).sum(axis=0, dtype=np.float32) for side in range(side_count(context)))
         halves = ((both + light, known) for (both, known), light in zip(of_samples, lamps, strict=True))
-    hidden = 0.0
     for name, (both, known) in zip(NOISE, halves, strict=False):
-        found = noise_map(both, known, context.traced.labels)
-        lit = found[known & (found > 0)]
-        hidden = max(hidden, float(np.mean(lit > 1)) if len(lit) else 0.0)
-        context.put(KIND, name, found, context.provenance())
-    if hidden > NOISY:
-        log.warning(TOO_DARK, 100 * hidden)
+        context.put(KIND, name, noise_map(both, known, context.traced.labels), context.provenance())

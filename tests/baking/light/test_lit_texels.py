@@ -61,3 +61,32 @@ def test_the_same_light_with_less_noise(mi: Any, make: Any, gathers: bool) -> No
     errors = [np.sqrt((((halves[0] - halves[1]) / 2) ** 2).sum()) / halves.shape[1] for halves in (alone, shared)]
     assert abs(means[1] - means[0]) < 4 * np.hypot(*errors)
     assert errors[1] < (0.7 if make is spot_room or gathers else 1.05) * errors[0]
+
+
+def test_chosen_texels_are_flat_squares_around_their_points(mi: Any) -> None:
+    from lambent.baking.surfaces.texels import texels_of
+    from lambent.baking.tracing.lights.lit_texels import SentLight
+
+    atlas = unwrap(room_with_step(), 48)
+    geometry = merged(atlas)
+    texels = texels_of(geometry, atlas.width, atlas.height)
+    sent = SentLight.of(texels, geometry, np.ones(len(texels.index)))
+    assert sent is not None
+    chosen = np.isin(texels.index, sent.index)
+    bent = (np.einsum("kpi,ki->kp", texels.flat, texels.flat[:, 0]) < 0.999).any(axis=1)
+    assert bent.any() and not (chosen & bent).any()
+    assert chosen[~bent].mean() > 0.9
+    offset = texels.positions[chosen] - sent.corner[:, None]
+    place = offset @ np.linalg.pinv(sent.sides)
+    assert np.allclose(place @ sent.sides, offset, atol=1e-4) and place.min() > -0.01 and place.max() < 1.01
+    assert np.allclose(np.linalg.norm(sent.sides, axis=2), texels.spacing[chosen][:, None], rtol=0.35)
+
+
+def test_nothing_is_chosen_in_the_dark(mi: Any) -> None:
+    from lambent.baking.surfaces.texels import texels_of
+    from lambent.baking.tracing.lights.lit_texels import SentLight
+
+    atlas = unwrap(room_with_step(), 16)
+    geometry = merged(atlas)
+    texels = texels_of(geometry, atlas.width, atlas.height)
+    assert SentLight.of(texels, geometry, np.zeros(len(texels.index))) is None
