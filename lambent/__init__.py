@@ -10,6 +10,7 @@ Names are imported at their first use.
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +36,10 @@ if TYPE_CHECKING:
     from lambent.api.views import View as View
     from lambent.api.windows import window as window
     from lambent.core.errors import UserError as UserError
+
+# Else numba takes them from a .numba_config.yaml of the current folder, and runs the code that such a cache holds.
+for _name in ("NUMBA_CACHE_DIR", "NUMBA_CACHE_LOCATOR_CLASSES"):
+    os.environ.setdefault(_name, "")
 
 __version__ = "1.0.0"
 _MODULES = {

@@ -21,7 +21,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from lambent.core.errors import UserError
 from lambent.core.files import write_text
@@ -46,6 +46,8 @@ import json, sys
 import drjit as dr
 import mitsuba as mi
 mi.set_variant(sys.argv[1])
+mi.file_resolver().clear()
+mi.file_resolver().append(mi.__path__[0])
 scene = mi.cornell_box()
 scene["sensor"]["film"]["width"] = scene["sensor"]["film"]["height"] = 4
 image = mi.render(mi.load_dict(scene), spp=1)
@@ -100,6 +102,7 @@ def engine() -> Engine:
 
     if mi.variant() != chosen.variant:
         mi.set_variant(chosen.variant)
+    _leave_current_folder(mi.file_resolver(), mi.__path__[0])
     import drjit as dr
 
     # To find loop invariants, Dr.Jit traces a loop twice, and a nested one four times; our kernels gain nothing from
@@ -107,6 +110,17 @@ def engine() -> Engine:
     dr.set_flag(dr.JitFlag.OptimizeLoops, False)
     set_threads(dr.thread_count())
     return chosen
+
+
+def _leave_current_folder(resolver: Any, package: str) -> None:
+    """Keep Mitsuba from the plugins of the current folder, which may be one that came with a scene.
+
+    It finds its own elsewhere, but looks there for those that Lambent registers.
+    """
+    resolver.clear()
+    resolver.append(package)
+    for file in Path("plugins").glob("lambent_*"):
+        raise UserError("would be loaded by Mitsuba", file=file.absolute(), hint="start Lambent in another folder")
 
 
 def set_threads(count: int) -> None:
