@@ -53,8 +53,8 @@ def _by_xatlas(meshes: Sequence[Triangles]) -> list[Laid]:
     packing = xatlas.PackOptions()
     packing.resolution, packing.padding, packing.bilinear = 16 * int(np.ceil(np.sqrt(len(meshes)))), 0, False
     atlas.generate(xatlas.ChartOptions(), packing, False)
-    with open(sys.stdout.fileno(), "wb", closefd=False) as out:
-        pickle.dump([atlas[i] for i in range(len(meshes))], out)
+    pickle.dump([atlas[i] for i in range(len(meshes))], sys.stdout.buffer)
+    sys.stdout.buffer.flush()
     os._exit(0)
 
 
