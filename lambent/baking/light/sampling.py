@@ -158,7 +158,7 @@ def _sums_of_pass(scene: Any, points: path_tracer.Points, count: int, seed: tupl
     first = dr.gather(mi.UInt32, mi.UInt32(rng.integers(POINTS, size=n, dtype=np.uint32)), texel)
     # the low bit already determines the azimuth of Hammersley points; a constant count would recompile for every tile
     point = texel % dr.opaque(mi.UInt32, count) * POINTS + (k // 2 + first) % POINTS
-    at = path_tracer.Points(*(dr.gather(mi.Vector3f, v, point) for v in (points.position, points.normal, points.flat)))
+    at = _chosen(points, point)
     u_bsdf = _shifted(hammersley(samples), shifts[:2], k, texel)
     u_emitter = _shifted(r2(samples), shifts[2:], k, texel)
     sampler = independent(int(rng.integers(1 << 32)), n * samples)
@@ -198,11 +198,18 @@ def _of_lit(
     thread = dr.arange(mi.UInt32, n * samples)
     texel, k = thread // samples, thread % samples
     point = texel % dr.opaque(mi.UInt32, count) * POINTS + k % POINTS
-    at = path_tracer.Points(*(dr.gather(mi.Vector3f, v, point) for v in (points.position, points.normal, points.flat)))
     u, tally = _shifted(r2(samples), shifts, k, texel), how.tally or path_tracer.AllLight()
     sampler = independent(int(rng.integers(1 << 32)), n * samples)
-    sums = path_tracer.of_lit(scene, sampler, at, u, how.max_depth, how.cache, tally, how.unseen, lit)
+    sums = path_tracer.of_lit(
+        scene, sampler, _chosen(points, point), u, how.max_depth, how.cache, tally, how.unseen, lit
+    )
     return _whole_and_parts(sums, tally.count, how.parts)
+
+
+def _chosen(points: path_tracer.Points, number: Any) -> path_tracer.Points:
+    """Those points of the numbers (mi.UInt32)."""
+    of = points.position, points.normal, points.flat
+    return path_tracer.Points(*(dr.gather(mi.Vector3f, values, number) for values in of))
 
 
 def _whole_and_parts(sums: list[Any], count: int, parts: int) -> list[Any]:

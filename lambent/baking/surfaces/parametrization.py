@@ -12,6 +12,7 @@ import pickle
 import subprocess
 import sys
 from collections.abc import Sequence
+from typing import NoReturn
 
 import numpy as np
 import xatlas
@@ -45,8 +46,8 @@ def laid_flat(meshes: Sequence[Triangles]) -> list[Laid]:
     return [(faces.reshape(-1), np.arange(count).reshape(-1, 3), np.full((count, 2), np.nan, np.float32))]
 
 
-def _by_xatlas(meshes: Sequence[Triangles]) -> list[Laid]:
-    """As `laid_flat`, of which this is the other process."""
+def _by_xatlas(meshes: Sequence[Triangles]) -> NoReturn:
+    """Write what `laid_flat` returns to stdout, and end this process, which is its other one."""
     atlas = xatlas.Atlas()
     for mesh in meshes:
         atlas.add_mesh(*mesh)

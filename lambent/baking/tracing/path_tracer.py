@@ -249,10 +249,15 @@ def irradiance_sums(
 
 def direct(scene: Any, points: Points, sampler: Any, unseen: Unseen | None = None) -> Any:
     """One sample of irradiance (mi.Color3f) at each point, W/m^2, straight from emitters that are not `unseen`."""
-    si = _at(points)
-    lights = scene if unseen is None or unseen.first is None else unseen.first.scene
-    ds, value = sample_emitter(scene, lights, si, sampler.next_2d(), mi.Bool(True), rays.has_holes(scene), unseen)
+    ds, value = _first_emitter(scene, _at(points), sampler.next_2d(), mi.Bool(True), unseen)
     return value * dr.maximum(dr.dot(ds.d, points.normal), 0.0)
+
+
+def _first_emitter(scene: Any, si: Any, u: Any, active: Any, unseen: Unseen | None) -> tuple[Any, Any]:
+    """`sample_emitter` at the start of a path."""
+    first = None if unseen is None else unseen.first
+    lights = scene if first is None else first.scene
+    return sample_emitter(scene, lights, si, u, active, rays.has_holes(scene), unseen)
 
 
 def of_lit(
@@ -304,9 +309,7 @@ def _contributions(
     ray = rays.leaving(scene, si.p, si.n, si.to_world(local))
     start = Start(ray, si, local.z / dr.pi, False, unseen, active, lit)
     along = radiance_sums(scene, sampler, start, max_depth, cache, tally)
-    first = None if unseen is None else unseen.first
-    lights = scene if first is None else first.scene
-    ds, value = sample_emitter(scene, lights, si, u_emitter, mi.Bool(active), rays.has_holes(scene), unseen)
+    ds, value = _first_emitter(scene, si, u_emitter, mi.Bool(active), unseen)
     cosine = dr.maximum(dr.dot(ds.d, points.normal), 0.0)
     weight = dr.select(ds.delta, 1.0, _balance(ds.pdf, cosine / dr.pi))
     brought = dr.select(ds.pdf > 0, cosine * weight, 0.0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -50,9 +49,6 @@ def sent_light(
 
 def _colours(traced: TracedScene) -> Floats:
     """(T,) share of diffuse light that faces send on, of those with one; textures, which lower it, are left out."""
-    found = []
-    for o in traced.scene.objects:
-        material: Any = traced.scene.materials.get(o.material)
-        sends = 1.0 if material is None else float(luminance(np.add(material.kd, material.kt_d)))
-        found.append(np.full(len(o.mesh.faces), sends))
-    return np.concatenate([np.zeros(0), *found])
+    materials, objects = traced.scene.materials, traced.scene.objects
+    known = {name: float(luminance(np.add(one.kd, one.kt_d))) for name, one in materials.items()}
+    return np.repeat([known.get(o.material, 1.0) for o in objects], [len(o.mesh.faces) for o in objects])

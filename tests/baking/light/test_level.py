@@ -69,7 +69,7 @@ def test_light_that_one_texel_in_two_hundred_finds_is_not_lost() -> None:
     kept = with_detail(with_level(clean, noisy, known, labels), noisy, variance_of(halves), known, labels)
     assert clean[known].mean() < 0.4 * noisy[known].mean()
     assert 0.6 * noisy[known].mean() < kept[known].mean() < 1.05 * noisy[known].mean()
-    assert np.median(kept[known]) > 0.02, "not in those texels alone"
+    assert np.median(kept[known]) > 0.035, "not in those texels alone"
 
 
 def test_a_lucky_path_brightens_no_other_chart() -> None:
