@@ -195,7 +195,7 @@ def _sampled_maps(context: BakeContext) -> Maps:
     from lambent.baking.tracing.group_tally import Direct
 
     def maps(name: str, stage: Stage) -> Maps:
-        found = []
+        stage, found = replace(stage, sent=_sent(context, stage)), []
         for side in range(side_count(context)):
             raw, labels = _samples(context, name, side, stage)
             context.progress(0, 1, "denoising")
@@ -229,7 +229,7 @@ def _sorted_maps(context: BakeContext) -> Maps:
     traced, count = context.traced, len(context.traced.sorted_lights.groups)
 
     def maps(name: str, stage: Stage, direct: Direct | None) -> list[GroupMaps]:
-        stage, found = replace(stage, by_group=True, direct=direct), []
+        stage, found = replace(stage, by_group=True, direct=direct, sent=_sent(context, stage)), []
         for side in range(side_count(context)):
             raw, labels = _samples(context, name, side, stage)
             by_group = context.store.read(_parts(_of_side(name, side)))[0]
@@ -279,8 +279,6 @@ def _samples(
         covered = np.zeros(texels.width * texels.height, bool)
         covered[texels.index[sides.valid.any(axis=1)]] = True
         of_map = covered.reshape(texels.height, texels.width)
-        if not stage.of_moments:
-            stage = replace(stage, sent=_sent(context, stage))
         run_jobs(
             writer,
             TileSampler(traced, stage),
@@ -305,6 +303,7 @@ def _sent(context: BakeContext, stage: Stage) -> SentLight | None:
     """What texels send under the maps of a stage, or in direct light."""
     from lambent.baking.tracing.sent_light import sent_light
 
+    context.traced.whole(diffuse=stage.diffuse)
     sides = range(side_count(context))
     maps = [lamp_light(context, side) for side in sides] if stage.lit is None else stage.lit[: len(sides)]
     of_sides = [context.traced.in_view(SIGNS[side])[0] for side in sides]
